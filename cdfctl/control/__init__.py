@@ -1,0 +1,1 @@
+"""What to command: constraint rows, the quadratic program that honours them, and the controller that joins both."""

@@ -1,0 +1,164 @@
+"""One quadratic program, solved and audited: no answer leaves here unless it satisfies its own optimality conditions.
+
+    min  1/2 x'P x + q'x      subject to      G x <= h,      lb <= x <= ub
+
+Solvers are reached by name through qpsolvers. A solver's own claim of success is not taken for an answer: the primal
+residual, the dual residual and the duality gap are computed here. What the chosen solver misses, or calls infeasible,
+is asked of :data:`SECOND_OPINION`.
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any, NamedTuple
+
+import numpy as np
+import qpsolvers
+
+from cdfctl.errors import InputError, name_hint
+from cdfctl.types import Array
+
+SECOND_OPINION = "clarabel"
+
+TOLERANCE = 1e-6
+"""Greatest residual of an accepted answer: rows in their own unit, dual residual and gap relative to the cost."""
+
+# Solvers whose own default tolerance is looser than ours.
+_SETTINGS: dict[str, dict[str, Any]] = {
+    "proxqp": {"eps_abs": 1e-9, "eps_rel": 0.0},
+    "osqp": {"eps_abs": 1e-9, "eps_rel": 0.0},
+    "scs": {"eps_abs": 1e-9, "eps_rel": 0.0},
+}
+
+
+class Problem(NamedTuple):
+    """The program above: ``P`` (v, v), ``q`` (v,), ``G`` (k, v), ``h`` (k,), bounds (v,), infinite where there are
+    none."""
+
+    P: Array
+    q: Array
+    G: Array
+    h: Array
+    lb: Array
+    ub: Array
+
+
+class Answer(NamedTuple):
+    """A candidate: ``x`` (v,), the multipliers of the rows ``z`` (k,) and of the bounds ``z_box`` (v,; negative at a
+    lower bound)."""
+
+    x: Array
+    z: Array
+    z_box: Array
+
+
+class Audit(NamedTuple):
+    """How far a candidate is from optimal; all three are zero at an optimum."""
+
+    primal: float
+    dual: float
+    gap: float
+
+    @property
+    def accepted(self) -> bool:
+        """All three within :data:`TOLERANCE` (a NaN is not)."""
+        return self.primal <= TOLERANCE and self.dual <= TOLERANCE and self.gap <= TOLERANCE
+
+
+def check_solver(name: str) -> None:
+    """Raise :class:`InputError` naming the installed solvers where ``name`` is not one of them."""
+    installed = qpsolvers.available_solvers
+    if name not in installed:
+        raise InputError(f"QP solver '{name}' is not installed", hint=name_hint(name, sorted(installed)))
+
+
+def solve(problem: Problem, solver: str) -> Array | None:
+    """The optimum x (v,) of ``problem``, or None where two solvers find none that passes the audit."""
+    for name in dict.fromkeys((solver, SECOND_OPINION)):
+        answer = ask(problem, name)
+        if answer is not None and audit(problem, answer).accepted:
+            return answer.x
+    return None
+
+
+def ask(problem: Problem, solver: str) -> Answer | None:
+    """One solver's answer, unaudited; None where it reports none."""
+    if solver == "clarabel":
+        return _ask_clarabel(problem)
+    P, q, G, h, lb, ub = problem
+    rows = G.shape[0] > 0
+    if solver not in qpsolvers.dense_solvers:
+        from scipy.sparse import csc_matrix  # sparse solvers warn about dense matrices
+
+        P, G = csc_matrix(P), csc_matrix(G)
+    stated = qpsolvers.Problem(P, q, G if rows else None, h if rows else None, lb=lb, ub=ub)
+    try:
+        if solver == "daqp":
+            solution = qpsolvers.solve_problem(stated, solver)
+        else:
+            with warnings.catch_warnings():  # some report "not found" as a warning too
+                warnings.simplefilter("ignore", UserWarning)
+                solution = qpsolvers.solve_problem(stated, solver, **_SETTINGS.get(solver, {}))
+    except qpsolvers.exceptions.QPError:
+        return None
+    if not solution.found or solution.x is None:
+        return None
+    z = solution.z if rows and solution.z is not None else np.zeros(len(h))
+    z_box = solution.z_box if solution.z_box is not None else np.zeros(len(q))
+    return Answer(solution.x, z, z_box)
+
+
+def _ask_clarabel(problem: Problem) -> Answer | None:
+    """Clarabel without the wrapper, which costs ten times the solve and warns wherever a program is infeasible."""
+    import clarabel
+    from scipy.sparse import csc_matrix
+
+    P, q, G, h, lb, ub = problem
+    upper, lower = np.isfinite(ub).nonzero()[0], np.isfinite(lb).nonzero()[0]
+    eye = np.eye(len(q))
+    A = np.vstack([G, eye[upper], -eye[lower]])
+    b = np.concatenate([h, ub[upper], -lb[lower]])
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    cones = [clarabel.NonnegativeConeT(len(b))] if len(b) else []
+    result = clarabel.DefaultSolver(csc_matrix(P), q, csc_matrix(A), b, cones, settings).solve()
+    if result.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
+        return None
+    k = len(h)
+    z = np.array(result.z)
+    z_box = np.zeros(len(q))
+    z_box[upper] += z[k : k + len(upper)]
+    z_box[lower] -= z[k + len(upper) :]
+    return Answer(np.array(result.x), z[:k], z_box)
+
+
+def audit(problem: Problem, answer: Answer) -> Audit:
+    """The optimality conditions of ``answer``, with z+ = max(z, 0) and z- = min(z, 0):
+
+        primal  max( G x - h, lb - x, x - ub, 0 )
+        dual    max( |P x + q + G'z + z_box|, -z ) / (1 + max|q|)
+        gap     | x'P x + q'x + h'z + lb'z_box- + ub'z_box+ | / (1 + |x'P x| + |q'x|)
+
+    Source: the residuals of Caron et al., qpsolvers, made relative to the size of the cost.
+    """
+    P, q, G, h, lb, ub = problem
+    x, z, z_box = answer
+    bound = np.where(z_box < 0.0, lb, ub)
+    real = np.isfinite(bound)  # an infinite bound has no multiplier
+    z_box = np.where(real, z_box, 0.0)
+    Px = P @ x
+    violation = max(float((lb - x).max()), float((x - ub).max()), 0.0)
+    stationary = Px + q + z_box
+    quadratic, linear = float(x @ Px), float(q @ x)
+    gap = quadratic + linear + float(np.where(real, bound, 0.0) @ z_box)
+    negative = 0.0
+    if z.shape[0]:
+        violation = max(violation, float((G @ x - h).max()))
+        stationary = stationary + z @ G
+        gap += float(h @ z)
+        negative = max(0.0, -float(z.min()))
+    return Audit(
+        primal=violation,
+        dual=max(float(np.abs(stationary).max()), negative) / (1.0 + float(np.abs(q).max())),
+        gap=abs(gap) / (1.0 + abs(quadratic) + abs(linear)),
+    )
