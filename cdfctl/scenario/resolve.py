@@ -1,4 +1,4 @@
-"""From a scenario as written to one that can be run: the variant's defaults filled in, and whether it can run at all."""
+"""From a scenario as written to one that can be run: the variant's defaults filled in, and whether it can run."""
 
 from __future__ import annotations
 

@@ -1,0 +1,110 @@
+"""Overrides: ``--set obstacles[0].velocity=[0, 1, 0]``, applied to a file's plain data before it is validated.
+
+So an override is held to the same rules as the file, and what is wrong with it is said under its own name.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from cdfctl.errors import InputError
+from cdfctl.scenario.problems import Path, Problem, ScenarioErrors, parse_path, path_text
+from cdfctl.scenario.schema import Scenario
+from cdfctl.scenario.wording import validate
+from cdfctl.scenario.yaml_loader import YamlError, read
+
+
+@dataclass(frozen=True)
+class Override:
+    """A field set from outside the file: its path, its plain value, and what the user wrote to set it."""
+
+    path: Path
+    value: Any
+    origin: str
+
+
+def parse_override(text: str, flag: str = "--set") -> Override:
+    """``controller.alpha=3`` as an override; the value is YAML, read as in a file.
+
+    Raises:
+        InputError: it has no '=', no valid path, or a value that is not YAML.
+    """
+    origin = f"{flag} {text}"
+    field, equals, value = text.partition("=")
+    if not equals:
+        raise InputError(f"{origin}: expected FIELD=VALUE", "for example --set controller.alpha=3")
+    try:
+        path = parse_path(field.strip())
+        document = read(value)
+        if document.problems:
+            raise document.problems[0]
+    except (InputError, YamlError) as error:
+        message = "the value is missing" if not value.strip() else error.message
+        raise InputError(f"{origin}: {message}", error.hint if value.strip() else None) from None
+    return Override(path, document.data, origin)
+
+
+def apply(data: Any, overrides: Sequence[Override]) -> tuple[Any, list[Problem]]:
+    """A copy of ``data`` with the overrides set, later ones over earlier ones; and those that have no place in it."""
+    data = copy.deepcopy(data)
+    problems = []
+    for override in overrides:
+        try:
+            data = _set(data, override.path, override.value)
+        except InputError as error:
+            problems.append(Problem("", error.message, path_text(override.path), error.hint, origin=override.origin))
+    return data, problems
+
+
+def _set(data: Any, path: Path, value: Any) -> Any:
+    """``data`` with ``value`` at ``path``; a section the file leaves out is made, an item of a list is not."""
+    root: Any = data if data is not None else {}
+    parent, parts = root, list(path)
+    for i, part in enumerate(parts):
+        here = path_text(path[:i]) or "the file"
+        if isinstance(part, int):
+            if not isinstance(parent, list):
+                raise InputError(f"{here} is not a list in the file", f"set it as a whole: {here}=[...]")
+            if part >= len(parent):
+                raise InputError(f"{here} has {len(parent)} items, counted from 0: there is no [{part}]")
+        elif isinstance(parent, list):
+            raise InputError(f"{here} is a list", f"name an item by its place: {here}[0]")
+        elif not isinstance(parent, dict):
+            raise InputError(f"{here} is a single value, without fields")
+        if i == len(parts) - 1:
+            parent[part] = value
+        elif isinstance(part, int):
+            parent = parent[part]
+        else:
+            if parent.get(part) is None and isinstance(parts[i + 1], str):
+                parent[part] = {}
+            parent = parent.get(part)
+    return root
+
+
+def set_fields(scenario: Scenario, values: Mapping[str, Any], origin: str = "set") -> Scenario:
+    """``scenario`` with fields set by path, validated again: ``{"controller.alpha": 3.0}``.
+
+    Raises:
+        ScenarioErrors: the result does not validate; each problem names ``origin`` and the field.
+    """
+    data = scenario.model_dump(mode="json", exclude_none=True)
+    overrides = [Override(parse_path(path), value, f"{origin} {path}={value}") for path, value in values.items()]
+    data, problems = apply(data, overrides)
+    changed, complaints = validate(data)
+    for message, hint, place in complaints:
+        problems.append(Problem(scenario.name, message, path_text(place), hint, origin=blame(overrides, place)))
+    if changed is None or problems:
+        raise ScenarioErrors(problems, scenario.name)
+    return changed
+
+
+def blame(overrides: Sequence[Override], place: Path) -> str | None:
+    """The last override that set this place, or part of it; None where the file did."""
+    for override in reversed(overrides):
+        if place[: len(override.path)] == override.path:
+            return override.origin
+    return None
