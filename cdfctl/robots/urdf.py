@@ -124,9 +124,7 @@ def _joint(path: Path, element: Element, links: Sequence[str]) -> UrdfJoint | No
     if kind == "fixed":
         return None
     if kind not in MOVING_TYPES:
-        raise InputError(
-            f"{where}: type '{kind}' is not supported", hint="allowed: fixed, " + ", ".join(MOVING_TYPES)
-        )
+        raise InputError(f"{where}: type '{kind}' is not supported", hint="allowed: fixed, " + ", ".join(MOVING_TYPES))
     axis = _numbers(where, element.find("axis"), "xyz", 3)
     if axis is not None and math.hypot(*axis) < 1e-9:
         raise InputError(f"{where}: its axis has no direction")
