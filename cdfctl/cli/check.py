@@ -1,0 +1,6 @@
+"""``cdfctl check``: validate a scenario, and do nothing else."""
+
+from __future__ import annotations
+
+
+def check(): ...

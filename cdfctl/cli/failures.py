@@ -1,0 +1,66 @@
+"""How a failed command ends: a message on standard error and an exit status."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Sequence
+from pathlib import Path
+
+from cdfctl import __version__
+from cdfctl.errors import CdfctlError
+
+BUG = 70
+
+
+def report_failure(error: CdfctlError, *, debug: bool) -> int:
+    """Print a failure the user can mend, and return its exit status."""
+    if debug:
+        traceback.print_exception(error)
+    text = str(error)
+    # An error in a file opens with the file's name, as compilers print it; the rest say who is speaking.
+    print(text if ": error: " in text.partition("\n")[0] else f"cdfctl: error: {text}", file=sys.stderr)
+    return error.exit_status
+
+
+def report_usage(error: Exception, *, debug: bool) -> int:
+    """Print what is wrong with the command line, and return status 2."""
+    if debug:
+        traceback.print_exception(error)
+    message = error.format_message() if hasattr(error, "format_message") else str(error)
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context is not None else "cdfctl"
+    print(f"cdfctl: error: {message}\n  hint   {command} --help", file=sys.stderr)
+    return CdfctlError.exit_status
+
+
+def report_bug(error: Exception, arguments: Sequence[str], *, debug: bool) -> int:
+    """Print one line that says where the traceback was written, and return status 70."""
+    if debug:
+        traceback.print_exception(error)
+    what = " ".join(f"{type(error).__name__}: {error}".split())
+    if len(what) > 200:
+        what = what[:200] + "…"
+    text = f"cdfctl {__version__}, Python {sys.version}\narguments: {list(arguments)!r}\n\n"
+    log = _write_log(text + "".join(traceback.format_exception(error)))
+    where = f"the log is {log}" if log is not None else "no log could be written; --debug shows the traceback"
+    print(f"cdfctl: this is a bug of cdfctl ({what}); {where}", file=sys.stderr)
+    return BUG
+
+
+def _write_log(text: str) -> Path | None:
+    """Write ``text`` to a new file in the cache folder, or else in the system's temporary folder."""
+    from cdfctl.cache import cache_dir
+
+    name = time.strftime("bug-%Y%m%d-%H%M%S.log")
+    for folder in (cache_dir() / "log", Path(tempfile.gettempdir())):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            path = folder / name
+            path.write_text(text, encoding="utf-8", errors="replace")
+        except OSError:
+            continue
+        return path
+    return None

@@ -1,0 +1,6 @@
+"""``cdfctl run``"""
+
+from __future__ import annotations
+
+
+def run(): ...

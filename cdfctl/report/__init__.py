@@ -1,0 +1,1 @@
+"""What people see: summaries and tables, as Rich renderables. Nothing here prints."""
