@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from cdfctl.errors import InputError, name_hint
 from cdfctl.scenario import problems as told
+from cdfctl.scenario.files import SUFFIXES, absolute
 from cdfctl.scenario.overrides import Override, apply, blame, parse_override
 from cdfctl.scenario.problems import Problem, ScenarioErrors, parse_path, path_text
 from cdfctl.scenario.resolve import obstructions
 from cdfctl.scenario.schema import VERSION, Scenario
 from cdfctl.scenario.wording import validate
 from cdfctl.scenario.yaml_loader import MAX_BYTES, Document, YamlError, read
-
-SUFFIXES = (".yaml", ".yml")
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,7 @@ def load_scenario(source: str | Path, overrides: Sequence[str | Override] = ()) 
     data, found = apply(document.data, changes)
     suspect = [problem.path for problem in document.problems if problem.path is not None]
     found += [_yaml_problem(shown, document, problem) for problem in document.problems]
-    data, missing = _absolute(data, path.resolve().parent)
+    data, missing = absolute(data, path.resolve().parent)
     scenario, complaints = validate(data)
     for message, hint, place in [*complaints, *missing]:
         if not any(place[: len(p)] == p for p in suspect):
@@ -115,18 +113,19 @@ def find_scenario(source: str | Path) -> Path:
     """
     text = str(source)
     shipped = _shipped()
+    if not text or not text.isprintable():
+        raise InputError(f"{text!r} is not the name of a scenario", name_hint("", shipped))
     if isinstance(source, str) and "/" not in text and os.sep not in text and not Path(text).suffix:
         if text in shipped:
             return shipped[text]
-        hint = name_hint(text, shipped)
-        if Path(text).exists():
-            hint = f"a path needs a '/' or a suffix: ./{text}; {hint}"
+        near = [name for name in (text, f"{text}.yaml", f"{text}.yml") if os.path.exists(name)]
+        hint = f"a path has a '/' or a suffix: ./{near[0]}" if near else name_hint(text, shipped)
         raise InputError(f"unknown scenario '{text}'", hint)
     path = Path(text)
-    if not path.exists():
+    if not os.path.exists(path):
         raise InputError(f"{text}: no such file", _nearest_file(path, list(shipped)))
     if path.is_dir():
-        inside = sorted(child.name for child in path.iterdir() if child.suffix in SUFFIXES)
+        inside = _scenarios_in(path)
         hint = (
             f"scenario files in it: {', '.join(inside[:8])}"
             if inside
@@ -140,11 +139,15 @@ def _shipped() -> dict[str, Path]:
     return {path.stem: path for path in sorted(scenarios_dir().glob("*.yaml"))}
 
 
-def _nearest_file(path: Path, names: list[str]) -> str | None:
-    beside = []
-    if path.parent.is_dir():
-        beside = [child.name for child in path.parent.iterdir() if child.suffix in SUFFIXES]
-    near = difflib.get_close_matches(path.name, beside, n=1)
+def _scenarios_in(folder: Path) -> list[str]:
+    try:
+        return sorted(child.name for child in folder.iterdir() if child.suffix in SUFFIXES)
+    except OSError:
+        return []
+
+
+def _nearest_file(path: Path, names: list[str]) -> str:
+    near = difflib.get_close_matches(path.name, _scenarios_in(path.parent), n=1)
     if near:
         return f"did you mean {path.parent / near[0]}?"
     near = difflib.get_close_matches(path.stem.lower(), [name.lower() for name in names], n=1)
@@ -170,19 +173,20 @@ def _read(path: Path, shown: str) -> Document:
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        before = raw[: error.start]
-        problem = Problem(
-            shown,
-            f"not UTF-8 text: byte 0x{raw[error.start]:02X}",
-            hint="save the file as UTF-8",
-            line=before.count(b"\n") + 1,
-            column=error.start - before.rfind(b"\n"),
-        )
-        raise ScenarioErrors([problem], shown) from None
+        raise ScenarioErrors([_not_utf8(raw, error.start, shown)], shown) from None
     try:
         return read(text)
     except YamlError as problem:
         raise ScenarioErrors([_yaml_problem(shown, Document(lines=text.splitlines()), problem)], shown) from None
+
+
+def _not_utf8(raw: bytes, at: int, shown: str) -> Problem:
+    start = raw.rfind(b"\n", 0, at) + 1
+    line = raw.count(b"\n", 0, at) + 1
+    column = len(raw[start:at].decode("utf-8", "replace")) + 1
+    excerpt = raw[start:].split(b"\n", 1)[0].decode("utf-8", "replace")
+    hint = "save the file as UTF-8"
+    return Problem(shown, f"not UTF-8 text: byte 0x{raw[at]:02X}", None, hint, line, column, excerpt)
 
 
 def _refuse_newer(document: Document, changes: Sequence[Override], shown: str) -> None:
@@ -192,44 +196,6 @@ def _refuse_newer(document: Document, changes: Sequence[Override], shown: str) -
         _, complaints = validate({"version": version})
         message, hint, place = next(c for c in complaints if c[2] == ("version",))
         raise ScenarioErrors([_locate(shown, document, (), message, hint, place)], shown)
-
-
-def _absolute(data: Any, base: Path) -> tuple[Any, list[tuple[str, str | None, told.Path]]]:
-    """Paths in ``data`` made absolute (in place): a copy of the scenario elsewhere must still find its files."""
-    missing: list[tuple[str, str | None, told.Path]] = []
-    for holder, key, place in _file_fields(data):
-        value = holder[key]
-        if not isinstance(value, str) or not value.strip() or not value.isprintable():
-            continue
-        path = base / value
-        if not path.exists():
-            missing.append((f"no such file: {value}", f"looked for {path}", place))
-        holder[key] = str(path)
-    return data, missing
-
-
-def _file_fields(data: Any) -> Iterator[tuple[Any, Any, told.Path]]:
-    robot = data.get("robot") if isinstance(data, dict) else None
-    if isinstance(robot, dict):
-        name = robot.get("name")
-        if isinstance(name, str) and ("/" in name or Path(name).suffix in SUFFIXES):
-            yield robot, "name", ("robot", "name")
-        if "urdf" in robot:
-            yield robot, "urdf", ("robot", "urdf")
-        folders = robot.get("package_dirs")
-        if isinstance(folders, list):
-            for i in range(len(folders)):
-                yield folders, i, ("robot", "package_dirs", i)
-    bodies: list[tuple[Any, told.Path]] = []
-    if isinstance(data, dict):
-        obstacles = data.get("obstacles")
-        bodies += [(body, ("obstacles", i)) for i, body in enumerate(obstacles if isinstance(obstacles, list) else [])]
-        task = data.get("task")
-        bodies.append((task.get("target") if isinstance(task, dict) else None, ("task", "target")))
-    for body, place in bodies:
-        shape = body.get("shape") if isinstance(body, dict) else None
-        if isinstance(shape, dict) and "file" in shape:
-            yield shape, "file", (*place, "shape", "file")
 
 
 def _yaml_problem(shown: str, document: Document, problem: YamlError) -> Problem:
@@ -243,6 +209,9 @@ def _locate(
 ) -> Problem:
     """At the value if the file has it (an unknown key: at the key), else at the nearest part that it has."""
     origin = blame(changes, place)
+    if origin is None and place not in document.values:
+        # Neither does the file have it: an override of a part of it made it.
+        origin = next((o.origin for o in changes if o.path[: len(place)] == place), None)
     if origin is not None:
         return Problem(shown, message, path_text(place), hint, origin=origin)
     nearest = place

@@ -69,7 +69,7 @@ def _set(data: Any, path: Path, value: Any) -> Any:
             if not isinstance(parent, list):
                 raise InputError(f"{here} is not a list in the file", f"set it as a whole: {here}=[...]")
             if part >= len(parent):
-                raise InputError(f"{here} has {len(parent)} items, counted from 0: there is no [{part}]")
+                raise InputError(f"there is no {here}[{part}]: the list has {len(parent)}, counted from 0")
         elif isinstance(parent, list):
             raise InputError(f"{here} is a list", f"name an item by its place: {here}[0]")
         elif not isinstance(parent, dict):
@@ -103,8 +103,5 @@ def set_fields(scenario: Scenario, values: Mapping[str, Any], origin: str = "set
 
 
 def blame(overrides: Sequence[Override], place: Path) -> str | None:
-    """The last override that set this place, or part of it; None where the file did."""
-    for override in reversed(overrides):
-        if place[: len(override.path)] == override.path:
-            return override.origin
-    return None
+    """The last override that set this place or what holds it; None where the file did."""
+    return next((o.origin for o in reversed(overrides) if place[: len(o.path)] == o.path), None)

@@ -21,6 +21,9 @@ Path = tuple[str | int, ...]
 SHOWN = 50
 """Problems printed of one file; the rest is counted."""
 
+DEEPEST = 16
+"""Steps of a path: more than any field has."""
+
 WIDTH = 100
 """Characters of a line that an excerpt shows."""
 
@@ -53,13 +56,14 @@ class Problem:
 
     def __str__(self) -> str:
         place = self.origin or self.file
+        message, field, hint = (_clean(text or "") for text in (self.message, self.field, self.hint))
         if self.origin is None and self.line is not None:
             place = f"{self.file}:{self.line}:{self.column}"
-        lines = [f"{place}: error: {self.message}"]
-        if self.field:
-            lines.append(f"  field  {self.field}")
-        if self.hint:
-            lines.append(f"  hint   {self.hint}")
+        lines = [f"{_clean(place)}: error: {message}"]
+        if field:
+            lines.append(f"  field  {field}")
+        if hint:
+            lines.append(f"  hint   {hint}")
         if self.origin is None and self.excerpt is not None:
             lines += self._excerpt()
         return "\n".join(lines)
@@ -92,6 +96,14 @@ class ScenarioErrors(InputError):  # noqa: N818  the plural says that it carries
         parts.append(f"{count} problem{'' if count == 1 else 's'} in {file}; nothing was run.")
         super().__init__("\n".join(parts))
 
+    def __reduce__(self) -> tuple[type[ScenarioErrors], tuple[list[Problem], str]]:
+        return type(self), (self.problems, self.file)
+
+
+def _clean(text: str) -> str:
+    """Without control characters: what a file holds must not steer the terminal."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
 
 def path_text(path: Path) -> str:
     """``("obstacles", 0, "velocity")`` as ``obstacles[0].velocity``."""
@@ -116,6 +128,6 @@ def parse_path(text: str) -> Path:
             break
         path.append(match["key"] if match["key"] is not None else int(match["index"]))
         position = match.end()
-    if not path or position != len(text):
+    if not path or position != len(text) or len(path) > DEEPEST:
         raise InputError(f"'{text}' is not the path of a field", "a path looks like obstacles[0].velocity")
     return tuple(path)

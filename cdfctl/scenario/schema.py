@@ -222,7 +222,7 @@ class SimulationConfig(Strict):
 class Scenario(Strict):
     """A scenario file."""
 
-    version: Annotated[Literal[1], BeforeValidator(_version), about("version of the format")]
+    version: Annotated[Literal[1], BeforeValidator(_version), about("version of the format; this one is 1")]
     name: Annotated[str, BeforeValidator(_name), about("name of the scenario: letters, digits, '.', '_', '-'")]
     description: Annotated[Text, about("one line for lists")] = ""
     source: Annotated[Text, about("where the set-up is from")] = ""

@@ -130,10 +130,8 @@ class Real:
 
     def _draw(self, value: dict[Any, Any]) -> Uniform:
         if not self.drawable:
-            raise refuse(
-                f"expected one number, found {found(value)}",
-                "draws are for robot.q0, task and obstacles only, so that every controller meets the same trial",
-            )
+            only = "draws are for robot.q0, task and obstacles, so that every controller meets the same trial"
+            raise refuse(f"expected one number, found {found(value)}", only if "uniform" in value else None)
         if set(value) != {"uniform"}:
             raise refuse(f"expected a number, found {found(value)}", "a draw is written {uniform: [a, b]}")
         ends = value["uniform"]
@@ -214,7 +212,8 @@ class ListOf:
     def __call__(self, value: object) -> tuple[object, ...]:
         wanted = f"{self.exact} {self.noun}" if self.exact is not None else self.noun
         if not isinstance(value, list | tuple):
-            raise refuse(f"expected a list of {wanted}, found {found(value)}")
+            hint = "each item of a list begins with '- '" if isinstance(value, dict) else None
+            raise refuse(f"expected a list of {wanted}, found {found(value)}", hint)
         if self.exact is not None and len(value) != self.exact:
             raise refuse(f"expected a list of {wanted}, found {found(value)}")
         if len(value) < self.least:

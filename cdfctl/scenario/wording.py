@@ -103,8 +103,11 @@ def _complaints(model: type[BaseModel], detail: ErrorDetails, data: Any) -> Iter
         allowed = str(context["expected_tags" if tag else "expected"]).replace("'", "").replace(" or ", ", ")
         place = (*place, "type") if tag else place
         wrong = str(context["tag"]) if tag else value
-        what = "unknown type" if tag else f"unknown {place[-1]}"
-        said = f"{what} '{wrong}'" if isinstance(wrong, str) else f"expected text, found {found(wrong)}"
+        said = (
+            f"unknown {'type' if tag else 'value'} '{wrong}'"
+            if isinstance(wrong, str)
+            else f"expected text, found {found(wrong)}"
+        )
         yield said, _choice(str(wrong), allowed.split(", ")), place
     elif kind == "union_tag_not_found":
         if isinstance(value, dict):

@@ -16,7 +16,7 @@ import yaml
 from cdfctl.scenario.problems import Path
 
 MAX_BYTES = 1 << 20
-MAX_NODES = 200_000
+MAX_NODES = 50_000
 MAX_DEPTH = 32
 MAX_DIGITS = 400
 
@@ -86,15 +86,19 @@ def scalar(text: str) -> str | int | float | bool | None:
 
 
 class _Loader(yaml.SafeLoader):
-    """The node API of pyyaml with a limit on depth, and without tags."""
+    """The node API of pyyaml with limits on depth and number, and without tags."""
 
     depth = 0
+    count = 0
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         event = self.peek_event()  # type: ignore[no-untyped-call]  # untyped in the stubs
         tag = getattr(event, "tag", None)
         if tag is not None:
             raise YamlError(f"tags are not accepted, found '{_short(tag)}'", "write the value alone", event.start_mark)
+        self.count += 1
+        if self.count > MAX_NODES:
+            raise _too_many()
         self.depth += 1
         if self.depth > MAX_DEPTH:
             raise YamlError(f"nested more than {MAX_DEPTH} levels deep", None, event.start_mark)
@@ -140,10 +144,7 @@ class _Builder:
     def value(self, node: yaml.Node, path: Path) -> Any:
         self.count += 1
         if self.count > MAX_NODES:
-            raise YamlError(
-                f"more than {MAX_NODES:,} values once its aliases are expanded",
-                "put large point sets in a file of their own (shape.file)",
-            )
+            raise _too_many()
         place = (node.start_mark.line + 1, node.start_mark.column + 1)
         self.document.values[path] = place
         self.document.keys.setdefault(path, place)
@@ -191,6 +192,11 @@ class _Builder:
         return data
 
 
+def _too_many() -> YamlError:
+    message = f"more than {MAX_NODES:,} values, aliases expanded: too large for a scenario"
+    return YamlError(message, "put large point sets in a file of their own (shape.file)")
+
+
 def _quiet(text: str) -> Any:
     try:
         return scalar(text)
@@ -203,18 +209,26 @@ def _short(text: str) -> str:
     return text if len(text) <= 40 else text[:37] + "..."
 
 
+_HINTS = (
+    ("flow sequence", "is the list that begins on line {line} closed by ']'?"),
+    ("flow mapping", "is the mapping that begins on line {line} closed by '}}', with a space after each colon?"),
+    ("quoted scalar", "is the quoted text that begins on line {line} closed?"),
+    ("simple key", "line {line} has no colon, or no space after it"),
+    ("block", "check the indentation since line {line}"),
+)
+
+
 def _syntax(error: yaml.MarkedYAMLError) -> NoReturn:
     """What pyyaml says, with a hint for the usual causes."""
-    problem = error.problem or "it cannot be read"
+    problem = (error.problem or "it cannot be read").replace("'<stream end>'", "the end of the text")
     hint = None
     if "found another document" in problem or "expected a single document" in str(error.context):
         raise YamlError("more than one document in the file", "remove the line '---'", error.problem_mark) from None
     if r"\t" in problem:
         problem, hint = "a tab where YAML allows spaces only", "indent with spaces"
-    elif "undefined alias" in problem:
-        pass
     elif "mapping values are not allowed" in problem:
         problem, hint = "a colon where none can stand", "text with a colon needs quotes; a key begins its own line"
-    elif error.context and error.context_mark is not None:
-        hint = f"{error.context}, begun on line {error.context_mark.line + 1}"
+    elif error.context_mark is not None:
+        line = error.context_mark.line + 1
+        hint = next((h.format(line=line) for context, h in _HINTS if context in (error.context or "")), None)
     raise YamlError(f"not valid YAML: {problem}", hint, error.problem_mark) from None
