@@ -31,10 +31,17 @@ class _Body(NamedTuple):
     faces: IntArray
 
 
-def assemble_robot(file: RobotFile, urdf_path: Path, package_dirs: Sequence[Path]) -> Robot:
-    """Build the robot of ``file`` from its URDF; errors as in :func:`~cdfctl.robots.robot.load_robot`."""
+def assemble_robot(file: RobotFile, urdf_path: Path, package_dirs: Sequence[Path], speed: float | None = None) -> Robot:
+    """Build the robot of ``file`` from its URDF; errors as in :func:`~cdfctl.robots.robot.load_robot`.
+
+    ``speed`` (rad/s or m/s), where given, is the velocity limit of every joint, whatever the URDF says.
+    """
     urdf = read_urdf(urdf_path, package_dirs)
     joints = _limited_joints(file, urdf)
+    if speed is not None:
+        if not (math.isfinite(speed) and speed > 0.0):
+            raise InputError(f"{urdf.path}: the velocity limit must be greater than 0, found {speed}")
+        joints = {name: replace(joint, velocity=speed) for name, joint in joints.items()}
     locked = _locked_joints(file, urdf)
     model, geometry = _reduced(urdf, locked)
     names = tuple(str(name) for name in model.names)[1:]
@@ -43,7 +50,7 @@ def assemble_robot(file: RobotFile, urdf_path: Path, package_dirs: Sequence[Path
     lower = np.array([joint.lower for joint in moving])
     upper = np.array([joint.upper for joint in moving])
     model.lowerPositionLimit, model.upperPositionLimit = lower, upper
-    bodies = _merged(file, urdf, _bodies(urdf, model, geometry))
+    bodies = _merged(file, _bodies(urdf, model, geometry))
     links = _unique(body.link for body in bodies if body.joint > 0)
     if not links:
         raise InputError(f"{urdf.path}: no moving link has collision geometry")
@@ -60,8 +67,8 @@ def assemble_robot(file: RobotFile, urdf_path: Path, package_dirs: Sequence[Path
         velocity_limit=velocity,
         continuous=chain.continuous,
         prismatic=chain.prismatic,
-        home=_home(file, urdf, lower, upper),
-        tip=_tip(file, urdf, model),
+        home=_home(file, lower, upper),
+        tip=_tip(file, model),
         links=links,
         base_links=_unique(body.link for body in bodies if body.joint == 0),
         geometry_links=tuple(body.link for body in bodies),
@@ -76,15 +83,15 @@ def _limited_joints(file: RobotFile, urdf: Urdf) -> dict[str, UrdfJoint]:
     """The URDF's moving joints with the limits of the robot file in place."""
     joints = dict(urdf.joints)
     for name, (lower, upper) in file.position_limits.items():
-        joint = _find(joints, name, f"{urdf.path}: position limit")
+        joint = _find(joints, name, f"{_robot(file)}: position limit")
         if not lower < upper:
-            raise InputError(f"{urdf.path}: position limit of joint '{name}': {lower} is not below {upper}")
+            raise InputError(f"{_robot(file)}: position limit of joint '{name}': {lower} is not below {upper}")
         kind = "revolute" if joint.type == "continuous" else joint.type
         joints[name] = replace(joint, lower=lower, upper=upper, type=kind)
     for name, speed in file.velocity_limits.items():
-        joint = _find(joints, name, f"{urdf.path}: velocity limit")
+        joint = _find(joints, name, f"{_robot(file)}: velocity limit")
         if not (math.isfinite(speed) and speed > 0.0):
-            raise InputError(f"{urdf.path}: velocity limit of joint '{name}' must be greater than 0, found {speed}")
+            raise InputError(f"{_robot(file)}: velocity limit of joint '{name}' must be greater than 0, found {speed}")
         joints[name] = replace(joint, velocity=speed)
     return joints
 
@@ -93,10 +100,10 @@ def _locked_joints(file: RobotFile, urdf: Urdf) -> dict[str, float]:
     """Joints to lock and where; a joint that mimics a locked one is locked with it."""
     locked: dict[str, float] = {}
     for name, value in file.lock.items():
-        joint = _find(urdf.joints, name, f"{urdf.path}: locked joint")
+        joint = _find(urdf.joints, name, f"{_robot(file)}: lock")
         if not joint.lower - 1e-9 <= value <= joint.upper + 1e-9:
             limits = f"[{joint.lower}, {joint.upper}]"
-            raise InputError(f"{urdf.path}: joint '{name}' cannot be locked at {value}: its limits are {limits}")
+            raise InputError(f"{_robot(file)}: joint '{name}' cannot be locked at {value}: its limits are {limits}")
         locked[name] = value
     for joint in urdf.joints.values():
         if joint.mimic is None or joint.name in locked:
@@ -109,7 +116,7 @@ def _locked_joints(file: RobotFile, urdf: Urdf) -> dict[str, float]:
             )
         locked[joint.name] = multiplier * locked[source] + offset
     if len(locked) == len(urdf.joints):
-        raise InputError(f"{urdf.path}: every joint is locked")
+        raise InputError(f"{_robot(file)}: every joint is locked")
     return locked
 
 
@@ -169,16 +176,16 @@ def _link_of(urdf: Urdf, model: Any, item: Any) -> str:
     return name if name in urdf.links else str(model.frames[item.parentFrame].name)
 
 
-def _merged(file: RobotFile, urdf: Urdf, bodies: list[_Body]) -> list[_Body]:
+def _merged(file: RobotFile, bodies: list[_Body]) -> list[_Body]:
     """Bodies of the links named in ``merge`` become one hull, where the first of them stood."""
     for name, links in file.merge.items():
         found = _unique(body.link for body in bodies)
         for link in links:
             if link not in found:
-                raise InputError(f"{urdf.path}: merge '{name}': unknown link '{link}'", hint=name_hint(link, found))
+                raise InputError(f"{_robot(file)}: merge '{name}': unknown link '{link}'", hint=name_hint(link, found))
         members = [body for body in bodies if body.link in links]
         if len({body.joint for body in members}) > 1 or any(b.shape.disc or b.shape.radius for b in members):
-            raise InputError(f"{urdf.path}: merge '{name}': only boxes and meshes that move together can be merged")
+            raise InputError(f"{_robot(file)}: merge '{name}': only boxes and meshes that move together can be merged")
         points = [b.shape.vertices @ b.placement.rotation.T + b.placement.translation for b in members]
         vertices, faces = convex_hull(np.concatenate(points))
         first = members[0]
@@ -259,22 +266,22 @@ def _chain(model: Any, lower: Array, upper: Array, continuous: Any) -> Chain:
     )
 
 
-def _home(file: RobotFile, urdf: Urdf, lower: Array, upper: Array) -> Array:
+def _home(file: RobotFile, lower: Array, upper: Array) -> Array:
     if file.home is None:
         bounded = np.isfinite(lower) & np.isfinite(upper)
         return np.where(bounded, 0.5 * (np.where(bounded, lower, 0.0) + np.where(bounded, upper, 0.0)), 0.0)
     home = np.array(file.home, dtype=np.float64)
     if home.shape != lower.shape:
-        raise InputError(f"{urdf.path}: home must have {len(lower)} numbers, found {len(home)}")
+        raise InputError(f"{_robot(file)}: home must have {len(lower)} numbers, found {len(home)}")
     return np.clip(home, lower, upper)  # limits may have been narrowed
 
 
-def _tip(file: RobotFile, urdf: Urdf, model: Any) -> str:
+def _tip(file: RobotFile, model: Any) -> str:
     names = _unique(str(frame.name) for frame in model.frames)
     if file.tip is None:
         return next(str(frame.name) for frame in reversed(list(model.frames)) if frame.parentJoint == model.njoints - 1)
     if file.tip not in names:
-        raise InputError(f"{urdf.path}: unknown tip frame '{file.tip}'", hint=name_hint(file.tip, names))
+        raise InputError(f"{_robot(file)}: unknown tip frame '{file.tip}'", hint=name_hint(file.tip, names))
     return file.tip
 
 
@@ -292,6 +299,10 @@ def _lock_note(urdf: Urdf, name: str, value: float) -> str:
 
 def _merge_notes(file: RobotFile) -> list[str]:
     return [f"{', '.join(links)} merged into one hull, '{name}'" for name, links in file.merge.items()]
+
+
+def _robot(file: RobotFile) -> str:
+    return f"robot '{file.name}'"
 
 
 def _unique(names: Iterable[str]) -> tuple[str, ...]:

@@ -129,7 +129,7 @@ def load_robot(
     package_dirs: Sequence[str | Path] = (),
     lock: Mapping[str, float] | None = None,
     position_limits: Mapping[str, tuple[float, float]] | None = None,
-    velocity_limits: Mapping[str, float] | None = None,
+    velocity_limits: Mapping[str, float] | float | None = None,
     tip: str | None = None,
 ) -> Robot:
     """A shipped robot by name, or the robot of a robot file (.yaml) or of a URDF (.urdf).
@@ -139,7 +139,8 @@ def load_robot(
         package_dirs: directories in which ``package://`` mesh names are looked for.
         lock: joints to lock, each at a position (rad or m); added to those of the robot file.
         position_limits: joint name to (lower, upper) in rad or m, in place of the URDF's.
-        velocity_limits: joint name to the bound on its speed in rad/s or m/s, in place of the URDF's.
+        velocity_limits: joint name to the bound on its speed in rad/s or m/s, in place of the URDF's; or one bound for
+            every joint.
         tip: frame whose path length is reported.
 
     Raises:
@@ -168,13 +169,15 @@ def load_robot(
         own_dirs += file_dirs
     if file is None:
         file = RobotFile(version=1, name=path.stem, description="", source=str(path), licence="", urdf=path.name)
+    speed = None if velocity_limits is None or isinstance(velocity_limits, Mapping) else float(velocity_limits)
+    named = velocity_limits if isinstance(velocity_limits, Mapping) else {}
     changes = {
         "lock": {**file.lock, **(lock or {})},
         "position_limits": {**file.position_limits, **(position_limits or {})},
-        "velocity_limits": {**file.velocity_limits, **(velocity_limits or {})},
+        "velocity_limits": {} if speed is not None else {**file.velocity_limits, **named},
         "tip": tip if tip is not None else file.tip,
     }
-    return assemble_robot(file.model_copy(update=changes), urdf, own_dirs)
+    return assemble_robot(file.model_copy(update=changes), urdf, own_dirs, speed)
 
 
 def frame_index(model: Any, name: str) -> int:
