@@ -1,0 +1,154 @@
+"""The robot: its convex pieces, where its joints are at q, and how its points move with q.
+
+The placement of joint i in the world is that of its parent, times the fixed placement of the joint, times a turn by
+q_i about the joint's axis or a slide by q_i along it. With z the axis in the world, o the joint's origin and p a point
+of a body the joint moves, the joint's column of the Jacobian at p is
+
+    J_i = z × (p - o)    for a turn,        J_i = z    for a slide.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from cdfctl.fields.kernel.jit import njit
+from cdfctl.fields.kernel.sets import ConvexSets, pack
+from cdfctl.fields.kernel.vec import Rot, Vec, add, compose, cross, dot, rot, rotate, scale, store, sub, vec
+from cdfctl.robots.robot import Chain, Robot
+from cdfctl.types import Array, IntArray
+
+
+class Body(NamedTuple):
+    """A robot as arrays: n joints, k pieces in the order of their links.
+
+    Attributes:
+        chain: the kinematic tree, n joints.
+        sets: the k pieces, each in its own frame.
+        joint: (k,) joint that carries the piece.
+        link: (k,) index into ``robot.links``.
+        first: (L+1,) the pieces of link l are first[l] … first[l+1] - 1.
+        rotation, translation: (k, 3, 3), (k, 3) the piece's frame in its joint's.
+    """
+
+    chain: Chain
+    sets: ConvexSets
+    joint: IntArray
+    link: IntArray
+    first: IntArray
+    rotation: Array
+    translation: Array
+
+
+class Frames(NamedTuple):
+    """Workspace: where the joints are, in the world.
+
+    Attributes:
+        rotation, translation: (n, 3, 3), (n, 3) placement of joint i, its own motion included.
+        axis: (n, 3) axis of joint i.
+    """
+
+    rotation: Array
+    translation: Array
+    axis: Array
+
+
+def body_of(robot: Robot) -> Body:
+    """The arrays of ``robot``."""
+    pieces = sorted(robot.pieces, key=lambda piece: piece.link)
+    k = len(pieces)
+    link = np.array([p.link for p in pieces], dtype=np.int64)
+    return Body(
+        # Copies: numba compiles anew for read-only arrays.
+        chain=Chain._make(np.array(part) for part in robot.chain),
+        sets=pack(pieces),
+        joint=np.array([p.joint for p in pieces], dtype=np.int64),
+        link=link,
+        first=np.searchsorted(link, np.arange(len(robot.links) + 1)).astype(np.int64),
+        rotation=np.array([p.rotation for p in pieces], dtype=np.float64).reshape(k, 3, 3),
+        translation=np.array([p.translation for p in pieces], dtype=np.float64).reshape(k, 3),
+    )
+
+
+def new_frames(body: Body) -> Frames:
+    """An empty workspace."""
+    n = len(body.chain.parent)
+    return Frames(np.zeros((n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3)))
+
+
+@njit
+def forward(body: Body, q: Array, frames: Frames) -> None:
+    """All joints at q (n,)."""
+    for i in range(q.shape[0]):
+        _place_joint(body, q, frames, i)
+
+
+@njit
+def forward_to(body: Body, q: Array, joint: int, frames: Frames) -> None:
+    """``joint`` at q (n,), and the joints between it and the base; the others keep what they had."""
+    for i in range(joint + 1):
+        if body.chain.moves[i, joint]:
+            _place_joint(body, q, frames, i)
+
+
+@njit
+def _place_joint(body: Body, q: Array, frames: Frames, i: int) -> None:
+    chain = body.chain
+    r, t = rot(chain.rotation, i), vec(chain.translation, i)
+    parent = chain.parent[i]
+    if parent >= 0:
+        parent_r = rot(frames.rotation, parent)
+        t = add(vec(frames.translation, parent), rotate(parent_r, t))
+        r = compose(parent_r, r)
+    axis = vec(chain.axis, i)
+    z = rotate(r, axis)
+    if chain.prismatic[i]:
+        t = add(t, scale(q[i], z))
+    else:
+        r = compose(r, turn(axis, q[i]))
+    store_rot(frames.rotation, i, r)
+    store(frames.translation, i, t)
+    store(frames.axis, i, z)
+
+
+@njit
+def turn(k: Vec, angle: float) -> Rot:
+    """Rotation by ``angle`` about the unit vector k (Rodrigues): 1 + sin [k] + (1 - cos) [k]²."""
+    s, c = sin(angle), 1.0 - cos(angle)
+    x, y, z = k
+    return (
+        (1.0 - c * (y * y + z * z), c * x * y - s * z, c * x * z + s * y),
+        (c * x * y + s * z, 1.0 - c * (x * x + z * z), c * y * z - s * x),
+        (c * x * z - s * y, c * y * z + s * x, 1.0 - c * (x * x + y * y)),
+    )
+
+
+@njit
+def store_rot(array: Array, i: int, r: Rot) -> None:
+    """Matrix i of a (k, 3, 3) array becomes ``r``."""
+    for k in range(3):
+        array[i, 0, k], array[i, 1, k], array[i, 2, k] = r[0][k], r[1][k], r[2][k]
+
+
+@njit
+def piece_pose(body: Body, frames: Frames, k: int) -> tuple[Rot, Vec]:
+    """Rotation and translation of piece k in the world; its joint must have been placed."""
+    joint = body.joint[k]
+    r = rot(frames.rotation, joint)
+    t = add(vec(frames.translation, joint), rotate(r, vec(body.translation, k)))
+    return compose(r, rot(body.rotation, k)), t
+
+
+@njit
+def gradient(body: Body, frames: Frames, joint: int, a: Vec, normal: Vec, out: Array) -> None:
+    """∂d/∂q = -νᵀ J_a for a point ``a`` (world) of the body of ``joint``, into ``out`` (n,); ν is ``normal``."""
+    chain = body.chain
+    for i in range(out.shape[0]):
+        if not chain.moves[i, joint]:
+            out[i] = 0.0
+        elif chain.prismatic[i]:
+            out[i] = -dot(normal, vec(frames.axis, i))
+        else:
+            out[i] = -dot(normal, cross(vec(frames.axis, i), sub(a, vec(frames.translation, i))))

@@ -1,0 +1,148 @@
+"""Signed distance of two convex sets with radii: GJK where their cores are apart, EPA where they overlap.
+
+    d = |core distance| - r_a - r_b        cores apart
+    d = -depth - r_a - r_b                 cores overlapping
+
+with the witness points a on the surface of A and b on that of B, and the unit normal from A to B. In every case
+b - a = d normal, and d grows by e when B moves by e along the normal.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cdfctl.fields.kernel.body import Body, Frames, piece_pose
+from cdfctl.fields.kernel.epa import Polytope, core_depth, new_polytope
+from cdfctl.fields.kernel.gjk import Simplex, core_distance, new_simplex
+from cdfctl.fields.kernel.jit import njit
+from cdfctl.fields.kernel.parts import Parts, obstacle_pose
+from cdfctl.fields.kernel.sets import ConvexSets
+from cdfctl.fields.kernel.vec import (
+    Rot,
+    Vec,
+    add,
+    along,
+    compose,
+    dot,
+    norm,
+    rotate,
+    rotate_back,
+    scale,
+    sub,
+    transpose,
+    vec,
+)
+
+
+class Work(NamedTuple):
+    """Workspace of the distance functions: one for each thread, nothing is kept between calls."""
+
+    simplex: Simplex
+    polytope: Polytope
+
+
+class Contact(NamedTuple):
+    """Signed distance of two sets, m, and where it is taken.
+
+    Attributes:
+        d: signed distance, negative in penetration.
+        a, b: witness points on the two surfaces, m.
+        normal: unit, from A to B; in penetration the direction in which B leaves A soonest.
+    """
+
+    d: float
+    a: Vec
+    b: Vec
+    normal: Vec
+
+
+@njit
+def signed_distance(
+    sets_a: ConvexSets,
+    i: int,
+    sets_b: ConvexSets,
+    j: int,
+    r: Rot,
+    t: Vec,
+    guess: Vec,
+    cutoff: float,
+    work: Work,
+) -> Contact:
+    """Set i of A against set j of B, whose frame is (r, t) in that of A; the answer is in the frame of A.
+
+    ``guess`` is a direction from A to B to start from: the normal of a like query, or zero for none. Where the distance
+    exceeds ``cutoff`` (m), the answer may be any d that is above the cutoff and not above the distance.
+    """
+    r_a, r_b = sets_a.radius[i], sets_b.radius[j]
+    if not dot(guess, guess) > 0.0:
+        guess = sub(add(rotate(r, vec(sets_b.centre, j)), t), vec(sets_a.centre, i))
+    if not dot(guess, guess) > 0.0:
+        guess = (0.0, 0.0, 1.0)
+    core_cutoff = max(0.0, cutoff + r_a + r_b)
+    core = core_distance(sets_a, i, sets_b, j, r, t, guess, core_cutoff, work.simplex)
+    if core.touching:
+        return _touching(sets_a, i, sets_b, j, r, t, core.a, core.v, work)
+    normal = scale(-1.0 / norm(core.v), core.v)
+    d = core.distance - r_a - r_b
+    return Contact(d, along(core.a, r_a, normal), along(core.b, -r_b, normal), normal)
+
+
+@njit
+def _touching(
+    sets_a: ConvexSets, i: int, sets_b: ConvexSets, j: int, r: Rot, t: Vec, shared: Vec, v: Vec, work: Work
+) -> Contact:
+    """The contact of cores that touch (their nearest points ``v`` apart, or less than rounding) or overlap."""
+    r_a, r_b = sets_a.radius[i], sets_b.radius[j]
+    core = core_depth(sets_a, i, sets_b, j, r, t, work.polytope)
+    a, depth, normal = core.a, core.depth, core.normal
+    if core.flat:
+        a, depth = shared, 0.0
+    d = -depth - r_a - r_b
+    return Contact(d, along(a, r_a, normal), along(a, r_a + d, normal), normal)
+
+
+@njit
+def piece_distance(
+    body: Body, frames: Frames, k: int, parts: Parts, p: int, guess: Vec, cutoff: float, work: Work
+) -> Contact:
+    """Piece k of the robot against part p of the obstacles, in the world.
+
+    The joint of the piece must have been placed (:func:`forward` or :func:`forward_to`). ``guess`` and ``cutoff`` are
+    those of :func:`signed_distance`, the guess in the world.
+    """
+    r_a, t_a = piece_pose(body, frames, k)
+    r, t = relative_pose(r_a, t_a, parts, p)
+    c = signed_distance(body.sets, k, parts.sets, p, r, t, rotate_back(r_a, guess), cutoff, work)
+    return Contact(c.d, add(t_a, rotate(r_a, c.a)), add(t_a, rotate(r_a, c.b)), rotate(r_a, c.normal))
+
+
+@njit
+def relative_pose(r_a: Rot, t_a: Vec, parts: Parts, p: int) -> tuple[Rot, Vec]:
+    """The frame of part p in that of a piece at (r_a, t_a) in the world."""
+    r_b, t_b = obstacle_pose(parts, parts.obstacle[p])
+    return compose(transpose(r_a), r_b), rotate_back(r_a, sub(t_b, t_a))
+
+
+@njit
+def lower_bound(body: Body, k: int, parts: Parts, p: int, r: Rot, t: Vec) -> float:
+    """A cheap lower bound of the signed distance of piece k and part p, whose frame is (r, t) in that of the piece.
+
+    It is the gap between the piece's bounding box and the part's bounding ball, -inf where they overlap.
+    """
+    c = add(rotate(r, vec(parts.sets.centre, p)), t)
+    lower, upper = body.sets.lower, body.sets.upper
+    x = max(lower[k, 0] - c[0], 0.0, c[0] - upper[k, 0])
+    y = max(lower[k, 1] - c[1], 0.0, c[1] - upper[k, 1])
+    z = max(lower[k, 2] - c[2], 0.0, c[2] - upper[k, 2])
+    gap = norm((x, y, z)) - parts.sets.reach[p]
+    return gap - body.sets.radius[k] - parts.sets.radius[p] if gap > 0.0 else -np.inf
+
+
+def new_work() -> Work:
+    """A workspace; about 150 kB."""
+    return Work(new_simplex(), new_polytope())
+
+
+NO_CONTACT = Contact(np.inf, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

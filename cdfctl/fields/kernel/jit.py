@@ -1,0 +1,64 @@
+"""The compiler of the kernel: one decorator, ``njit``, so that every function is compiled the same way.
+
+- ``fastmath`` is off: distances must agree with another implementation to 1e-9, and NaN and infinity are meant.
+- ``error_model="numpy"``: a division by zero gives infinity instead of a branch to an exception.
+- ``_nrt`` is off: compiled code has no memory manager. Nothing can allocate (an attempt is an error of the compiler),
+  and passing arrays about does not count references, which here cost five times the work itself.
+- Machine code is kept under the cache place of cdfctl, in a folder named after the text of all kernel sources.
+  Numba looks only at the file of the cached function itself, so without that name a change in ``vec.py`` would leave
+  an old ``gjk.py``, with the old ``vec.py`` inlined, in use. Where the cache cannot be written, functions are compiled
+  afresh in every process.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar, cast
+
+import numba
+
+from cdfctl.cache import cache_dir, writable_dir
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+OPTIONS: dict[str, Any] = {
+    "nogil": True,
+    "error_model": "numpy",
+    "fastmath": False,
+    "boundscheck": False,
+    "_nrt": False,
+}
+    "nogil": True,
+    "error_model": "numpy",
+    "fastmath": False,
+    "boundscheck": False,
+    "_nrt": False,
+}
+
+
+def njit(function: Callable[P, T]) -> Callable[P, T]:
+    """``numba.njit`` with the options of this package; the types of ``function`` are kept."""
+    folder = _kernel_cache()
+    # Numba reads its cache folder once, when a function is decorated: lend it ours for that moment only, so that the
+    # caches of other packages in the process stay where they are.
+    config: Any = numba.config
+    theirs = config.CACHE_DIR
+    config.CACHE_DIR = str(folder or theirs)
+    try:
+        compiled = numba.njit(cache=folder is not None, **OPTIONS)(function)
+    finally:
+        config.CACHE_DIR = theirs
+    return cast(Callable[P, T], compiled)
+
+
+@cache
+def _kernel_cache() -> Path | None:
+    digest = hashlib.sha256(f"{numba.__version__} {platform.python_version()}".encode())
+    for source in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(source.read_bytes())
+    return writable_dir(cache_dir() / "kernels" / digest.hexdigest()[:16])

@@ -1,0 +1,118 @@
+"""The rows of the signed distance field: which pair of piece and part is nearest, and its two derivatives."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from cdfctl.fields.kernel.body import Body, Frames, forward, gradient, piece_pose
+from cdfctl.fields.kernel.distance import NO_CONTACT, Contact, Work, lower_bound, piece_distance, relative_pose
+from cdfctl.fields.kernel.jit import njit
+from cdfctl.fields.kernel.parts import Parts, time_derivative
+from cdfctl.fields.kernel.vec import ZERO, store
+from cdfctl.types import Array, BoolArray, IntArray
+
+STILL = 1e-9  # a gradient shorter than this, m/rad or m/m, means that no joint can change the distance
+
+
+class Answer(NamedTuple):
+    """r rows to fill: ``link`` (r,), ``d`` (r,), ``dq`` (r, n), ``dt`` (r,), ``valid`` (r,), and the witness points
+    ``a`` on the robot, ``b`` on the obstacle and the unit ``normal`` between them, (r, 3), all in the world."""
+
+    link: IntArray
+    d: Array
+    dq: Array
+    dt: Array
+    valid: BoolArray
+    a: Array
+    b: Array
+    normal: Array
+
+
+def new_answer(r: int, n: int) -> Answer:
+    """Rows not filled yet."""
+    return Answer(
+        np.empty(r, dtype=np.int64),
+        np.empty(r),
+        np.empty((r, n)),
+        np.empty(r),
+        np.empty(r, dtype=np.bool_),
+        np.empty((r, 3)),
+        np.empty((r, 3)),
+        np.empty((r, 3)),
+    )
+
+
+@njit
+def nearest_rows(body: Body, q: Array, parts: Parts, frames: Frames, work: Work, answer: Answer) -> None:
+    """One row an obstacle: the nearest of all links."""
+    forward(body, q, frames)
+    for o in range(parts.first.shape[0] - 1):
+        k, contact = nearest_pair(body, frames, 0, body.joint.shape[0], parts, o, work)
+        _fill(body, frames, parts, o, k, contact, answer, o)
+
+
+@njit
+def link_rows(body: Body, q: Array, parts: Parts, frames: Frames, work: Work, answer: Answer) -> None:
+    """One row for each obstacle and link, the links of the first obstacle first."""
+    forward(body, q, frames)
+    row = 0
+    for o in range(parts.first.shape[0] - 1):
+        for link in range(body.first.shape[0] - 1):
+            k, contact = nearest_pair(body, frames, body.first[link], body.first[link + 1], parts, o, work)
+            _fill(body, frames, parts, o, k, contact, answer, row)
+            row += 1
+
+
+@njit
+def nearest_pair(
+    body: Body, frames: Frames, first: int, last: int, parts: Parts, o: int, work: Work
+) -> tuple[int, Contact]:
+    """The piece among ``first`` … ``last`` - 1 nearest to obstacle o, and the contact; (-1, no contact) for none.
+
+    The pair with the least lower bound is measured first, then every pair whose lower bound is below the best.
+    """
+    start_k, start_p, least = -1, -1, np.inf
+    if last - first == 1 and parts.first[o + 1] - parts.first[o] == 1:
+        return first, piece_distance(body, frames, first, parts, parts.first[o], ZERO, np.inf, work)
+    for k in range(first, last):
+        r_a, t_a = piece_pose(body, frames, k)
+        for p in range(parts.first[o], parts.first[o + 1]):
+            r, t = relative_pose(r_a, t_a, parts, p)
+            bound = lower_bound(body, k, parts, p, r, t)
+            if start_k < 0 or bound < least:
+                start_k, start_p, least = k, p, bound
+    if start_k < 0:
+        return -1, NO_CONTACT
+    best_k, best = start_k, piece_distance(body, frames, start_k, parts, start_p, ZERO, np.inf, work)
+    for k in range(first, last):
+        r_a, t_a = piece_pose(body, frames, k)
+        for p in range(parts.first[o], parts.first[o + 1]):
+            r, t = relative_pose(r_a, t_a, parts, p)
+            if lower_bound(body, k, parts, p, r, t) < best.d and not (k == start_k and p == start_p):
+                contact = piece_distance(body, frames, k, parts, p, ZERO, best.d, work)
+                if contact.d < best.d:
+                    best_k, best = k, contact
+    return best_k, best
+
+
+@njit
+def _fill(body: Body, frames: Frames, parts: Parts, o: int, k: int, contact: Contact, answer: Answer, row: int) -> None:
+    answer.d[row] = contact.d
+    store(answer.a, row, contact.a)
+    store(answer.b, row, contact.b)
+    store(answer.normal, row, contact.normal)
+    dq = answer.dq[row]
+    if k < 0:
+        answer.link[row], answer.dt[row], answer.valid[row] = -1, 0.0, False
+        dq[:] = 0.0
+        return
+    answer.link[row] = body.link[k]
+    answer.dt[row] = time_derivative(parts, o, contact.b, contact.normal)
+    gradient(body, frames, body.joint[k], contact.a, contact.normal, dq)
+    length2 = 0.0
+    for i in range(dq.shape[0]):
+        length2 += dq[i] * dq[i]
+    answer.valid[row] = sqrt(length2) >= STILL
