@@ -33,12 +33,6 @@ OPTIONS: dict[str, Any] = {
     "boundscheck": False,
     "_nrt": False,
 }
-    "nogil": True,
-    "error_model": "numpy",
-    "fastmath": False,
-    "boundscheck": False,
-    "_nrt": False,
-}
 
 
 def njit(function: Callable[P, T]) -> Callable[P, T]:
