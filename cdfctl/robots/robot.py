@@ -82,7 +82,7 @@ class Robot:
         geometry_links: the link's name of every object of ``geometry``.
         pieces: convex pieces of the moving links.
         chain: the kinematic tree as arrays.
-        hash: sha256 of all that determines kinematics, geometry and limits.
+        hash: sha256 of all that a contact depends on: kinematics, geometry, position limits (not the velocity limit).
         notes: facts to print with results.
     """
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import importlib.metadata
 import json
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+from pydantic_core import ErrorDetails
 
 from cdfctl.errors import InputError, MissingError, name_hint
+from cdfctl.scenario.problems import Problem, ScenarioErrors, path_text
+from cdfctl.scenario.yaml_loader import MAX_BYTES, Document, YamlError, read
 
 DATA = Path(__file__).parent / "data"
 ROBOT_FILE_SUFFIXES = (".yaml", ".yml")
@@ -20,23 +22,33 @@ class _Strict(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
 
-class DistributionUrdf(_Strict):
-    """A URDF inside an installed data package; ``root`` is also the directory of its ROS packages."""
+class DataPackage(_Strict):
+    """An installed Python package that holds robot data; ``root`` is also the directory of its ROS packages."""
 
     distribution: str
     root: str
-    path: str
 
 
 class RobotFile(_Strict):
-    """A robot file, version 1. Positions in rad (m for prismatic joints), velocities in rad/s (m/s)."""
+    """A robot file, version 1. Positions in rad (m for prismatic joints), velocities in rad/s (m/s).
+
+    Attributes:
+        urdf: path of the URDF, relative to the root of ``package``; without one, to this file.
+        package_dirs: where ``package://`` mesh names are looked for, relative to this file.
+        lock: joints to lock, and where.
+        merge: a new name for links that move together, which become one convex hull.
+        tip: frame whose path length is reported.
+        home: an example configuration out of contact.
+        notes: facts to print with results.
+    """
 
     version: Literal[1]
     name: str = Field(min_length=1)
     description: str
     source: str
     licence: str
-    urdf: str | DistributionUrdf
+    urdf: str = Field(min_length=1)
+    package: DataPackage | None = None
     package_dirs: tuple[str, ...] = ()
     lock: dict[str, FiniteFloat] = {}
     merge: dict[str, tuple[str, ...]] = {}
@@ -69,15 +81,22 @@ def read_robot_file(path: Path) -> RobotFile:
     """Read and validate a robot file.
 
     Raises:
-        InputError: the file cannot be read, is not YAML, or does not validate (the first problem, in one line).
+        InputError: the file cannot be read, is not YAML, or does not validate; every problem with its place.
     """
-    data = _load_yaml(path)
+    text = _read_text(path)
+    document = Document(lines=text.splitlines())
     try:
-        return RobotFile.model_validate_json(json.dumps(data))
-    except TypeError as error:
-        raise InputError(f"{path}: {error}") from None
+        document = read(text)
+    except YamlError as error:
+        raise ScenarioErrors([_yaml_problem(path, document, error)], str(path)) from None
+    problems = [_yaml_problem(path, document, error) for error in document.problems]
+    try:
+        file = RobotFile.model_validate_json(json.dumps(document.data))
     except ValidationError as error:
-        raise _first_problem(path, error) from None
+        problems += [_problem(path, document, found) for found in error.errors(include_url=False)]
+    if problems:
+        raise ScenarioErrors(problems, str(path))
+    return file
 
 
 def find_urdf(file: RobotFile, path: Path) -> tuple[Path, tuple[Path, ...]]:
@@ -87,23 +106,25 @@ def find_urdf(file: RobotFile, path: Path) -> tuple[Path, tuple[Path, ...]]:
         MissingError: the data package it names is not installed.
     """
     package_dirs = tuple(path.parent / entry for entry in file.package_dirs)
-    if isinstance(file.urdf, str):
+    if file.package is None:
         return path.parent / file.urdf, package_dirs
     try:
-        distribution = importlib.metadata.distribution(file.urdf.distribution)
+        distribution = importlib.metadata.distribution(file.package.distribution)
     except importlib.metadata.PackageNotFoundError:
         raise MissingError(
-            f"robot '{file.name}' needs the data package {file.urdf.distribution}, which is not installed",
-            hint=f"pip install {file.urdf.distribution}",
+            f"robot '{file.name}' needs the data package {file.package.distribution}, which is not installed",
+            hint=f"pip install {file.package.distribution}",
         ) from None
-    root = Path(str(distribution.locate_file(file.urdf.root)))
-    return root / file.urdf.path, (root, *package_dirs)
+    root = Path(str(distribution.locate_file(file.package.root)))
+    return root / file.urdf, (root, *package_dirs)
 
 
-def _load_yaml(path: Path) -> Any:
+def _read_text(path: Path) -> str:
     if path.is_dir():
         raise InputError(f"{path}: is a directory, not a robot file")
     try:
+        if path.stat().st_size > MAX_BYTES:
+            raise InputError(f"{path}: larger than {MAX_BYTES} bytes, which no robot file is")
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise InputError(f"{path}: no such robot file") from None
@@ -111,18 +132,39 @@ def _load_yaml(path: Path) -> Any:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
         raise InputError(f"{path}: is not UTF-8 text") from None
-    try:
-        return yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise InputError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
+    if not text.strip():
+        raise InputError(f"{path}: the file is empty", hint="a robot file begins with version: 1")
+    return text
 
 
-def _first_problem(path: Path, error: ValidationError) -> InputError:
-    problem = error.errors(include_url=False)[0]
-    field = ".".join(str(part) for part in problem["loc"])
-    if problem["type"] == "extra_forbidden":
-        key = str(problem["loc"][-1])
-        return InputError(f"{path}: unknown key '{field}'", hint=name_hint(key, RobotFile.model_fields))
-    if problem["type"] == "missing":
-        return InputError(f"{path}: '{field}' is missing")
-    return InputError(f"{path}: {field or 'document'}: {problem['msg']}")
+def _yaml_problem(path: Path, document: Document, error: YamlError) -> Problem:
+    field = path_text(error.path) if error.path else None
+    return _at(path, document, error.line, error.column, error.message, field, error.hint)
+
+
+def _problem(path: Path, document: Document, found: ErrorDetails) -> Problem:
+    """A validation error at its place in the file: that of the key, or of the nearest parent there is."""
+    where, message, hint = found["loc"], found["msg"], None
+    if found["type"] == "extra_forbidden":
+        message = f"unknown key '{where[-1]}'"
+        hint = name_hint(str(where[-1]), DataPackage.model_fields if len(where) > 1 else RobotFile.model_fields)
+    elif found["type"] == "missing":
+        message = f"'{where[-1]}' is missing"
+    known = where
+    while known and known not in document.values:
+        known = known[:-1]
+    line, column = document.keys.get(known, document.values.get(known, (1, 1)))
+    return _at(path, document, line, column, message, path_text(where) or None, hint)
+
+
+def _at(
+    path: Path,
+    document: Document,
+    line: int | None,
+    column: int | None,
+    message: str,
+    field: str | None,
+    hint: str | None,
+) -> Problem:
+    excerpt = document.lines[line - 1] if line is not None and line <= len(document.lines) else None
+    return Problem(str(path), message, field, hint, line, column, excerpt)
