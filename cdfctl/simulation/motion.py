@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -44,10 +43,10 @@ class SceneMotion:
     shapes: tuple[Shape, ...]
     names: tuple[str, ...]
 
-    def __init__(self, obstacles: Sequence[Body], base: Path | None = None) -> None:
-        """``obstacles`` without draws left in them; mesh and point files are relative to the folder ``base`` (the
-        current one if None). Raises :class:`cdfctl.errors.InputError` for a file that cannot be read."""
-        self.shapes = tuple(shape_of(o.shape, base) for o in obstacles)
+    def __init__(self, obstacles: Sequence[Body]) -> None:
+        """``obstacles`` without draws left in them. Raises :class:`cdfctl.errors.InputError` for a shape's file that
+        cannot be read."""
+        self.shapes = tuple(shape_of(o.shape) for o in obstacles)
         self.names = tuple(_name(o, i) for i, o in enumerate(obstacles))
         m = len(obstacles)
         self._pose0, self._twist0 = np.zeros((m, 7)), np.zeros((m, 6))

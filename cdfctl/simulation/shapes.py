@@ -1,4 +1,4 @@
-"""A scenario's shapes as geometry; mesh and point files are read here, relative to the scenario file."""
+"""A scenario's shapes as geometry; mesh and point files are read here."""
 
 from __future__ import annotations
 
@@ -26,14 +26,12 @@ MAX_POINTS = 100_000
 """Most points a cloud may have: each one is a body to the field."""
 
 
-def shape_of(config: ShapeConfig, base: Path | None = None) -> Shape:
-    """The geometry of ``config``, whose numbers are drawn; files are relative to the folder ``base``, by default the
-    current one.
+def shape_of(config: ShapeConfig) -> Shape:
+    """The geometry of ``config``, whose numbers are drawn and whose paths the loader has made absolute.
 
     Raises:
         InputError: a file cannot be read, or holds no shape.
     """
-    folder = base if base is not None else Path()
     match config:
         case BallShape():
             return Sphere(_drawn(config.radius))
@@ -46,12 +44,12 @@ def shape_of(config: ShapeConfig, base: Path | None = None) -> Shape:
             return Cylinder(_drawn(config.radius), _drawn(config.length))
         case MeshShape():
             if config.file is not None:
-                return ConvexMesh(folder / config.file)
+                return ConvexMesh(Path(config.file))
             return ConvexMesh(np.array(config.vertices, dtype=np.float64))
         case CloudShape():
             radius = _drawn(config.radius)
             if config.file is not None:
-                return PointCloud(load_points(folder / config.file), radius)
+                return PointCloud(load_points(Path(config.file)), radius)
             return PointCloud(np.array(config.points, dtype=np.float64), radius)
 
 

@@ -149,13 +149,13 @@ def test_scene_keeps_its_shapes_and_names() -> None:
 
 
 @pytest.mark.parametrize("name", ["cloud.npy", "cloud.csv", "cloud.txt"])
-def test_points_are_read_relative_to_the_scenario(tmp_path: Path, name: str) -> None:
+def test_points_are_read(tmp_path: Path, name: str) -> None:
     points = np.array([[0.0, 0.1, 0.2], [1e-3, -2.0, 3.5]])
     if name.endswith("npy"):
         np.save(tmp_path / name, points)
     else:
         np.savetxt(tmp_path / name, points, delimiter="," if name.endswith("csv") else " ", header="x y z")
-    cloud = shape_of(CloudShape(type="point-cloud", file=name, radius=0.01), tmp_path)
+    cloud = shape_of(CloudShape(type="point-cloud", file=str(tmp_path / name), radius=0.01))
     assert isinstance(cloud, PointCloud)
     assert cloud.points.tolist() == points.tolist()
 

@@ -1,0 +1,127 @@
+"""From a scenario to a closed loop: the only place that wires robot, motion, controller, plant and judge."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from cdfctl.control.controller import build
+from cdfctl.errors import InputError
+from cdfctl.robots.robot import Robot
+from cdfctl.scenario.draws import draw
+from cdfctl.scenario.library import ScenarioFile
+from cdfctl.scenario.problems import path_text
+from cdfctl.scenario.resolve import resolve
+from cdfctl.scenario.schema import Scenario
+from cdfctl.scenario.values import Complaint
+from cdfctl.simulation.checks import robot_complaints, robot_of, scenario_complaints
+from cdfctl.simulation.goals import goal_of
+from cdfctl.simulation.judge import judge
+from cdfctl.simulation.motion import SceneMotion
+from cdfctl.simulation.plant import KinematicPlant
+from cdfctl.simulation.result import RunResult
+from cdfctl.simulation.rollout import Rollout, Step
+from cdfctl.simulation.shapes import vector_of
+
+
+@dataclass
+class Trial:
+    """One set-up, wired and ready to run once.
+
+    Attributes:
+        scenario: as resolved, every default and draw written out.
+        trial: which draw of the scenario's seed it is.
+        robot: the robot.
+        motion: the obstacles over time.
+        rollout: the closed loop.
+    """
+
+    scenario: Scenario
+    trial: int
+    robot: Robot
+    motion: SceneMotion
+    rollout: Rollout
+
+    def run(self) -> Iterator[Step]:
+        """Run the closed loop, yielding after every control step; it may be left early."""
+        return self.rollout.steps()
+
+    def result(self) -> RunResult:
+        """What the steps so far come to, judged: all of them after :meth:`run`, or those before an interrupt."""
+        trajectory = self.rollout.trajectory()
+        return RunResult(
+            scenario=self.scenario,
+            robot=self.robot.name,
+            trial=self.trial,
+            trajectory=trajectory,
+            verdict=judge(self.robot, self.motion, trajectory, self.rollout.stop),
+            stop=self.rollout.stop,
+            reason=self.rollout.reason,
+        )
+
+
+def assemble(file: ScenarioFile, *, trial: int = 0, robot: Robot | None = None) -> Trial:
+    """The trial ``trial`` of a scenario file, drawn, resolved and checked.
+
+    Args:
+        file: from :func:`cdfctl.scenario.library.load_scenario`.
+        trial: which draw of the scenario's seed.
+        robot: the scenario's robot where it is at hand (a benchmark loads it once), None to load it.
+
+    Raises:
+        ScenarioErrors: everything about the scenario that does not fit the robot, each at its place in the file.
+        MissingError: something the scenario needs is not installed.
+    """
+    file.check_runnable()
+    scenario = resolve(draw(file.scenario, file.scenario.seed, trial))
+    try:
+        return _assemble(scenario, trial, robot)
+    except _MisfitError as misfit:
+        found = [file.located(place, message, hint) for message, hint, place in misfit.complaints]
+        raise file.errors(found) from None
+
+
+def assemble_scenario(scenario: Scenario, *, trial: int = 0, robot: Robot | None = None) -> Trial:
+    """The same for a scenario that is drawn and resolved already and has no file to point into.
+
+    Raises:
+        InputError: everything about the scenario that does not fit the robot, one line each.
+    """
+    try:
+        return _assemble(scenario, trial, robot)
+    except _MisfitError as misfit:
+        raise misfit.as_input_error() from None
+
+
+class _MisfitError(Exception):
+    def __init__(self, complaints: Sequence[Complaint]) -> None:
+        super().__init__(complaints)
+        self.complaints = complaints
+
+    def as_input_error(self) -> InputError:
+        lines = [f"{path_text(place)}: {message}" for message, _, place in self.complaints]
+        hints = [hint for _, hint, _ in self.complaints if hint]
+        return InputError("\n".join(lines), hints[0] if len(lines) == 1 and hints else None)
+
+
+def _assemble(scenario: Scenario, trial: int, robot: Robot | None) -> Trial:
+    if robot is None:
+        try:
+            robot = robot_of(scenario.robot)
+        except InputError as error:
+            raise _MisfitError(robot_complaints(scenario.robot, error)) from None
+    complaints = scenario_complaints(scenario, robot)
+    if complaints:
+        raise _MisfitError(complaints)
+    simulation = scenario.simulation
+    motion = SceneMotion(scenario.obstacles)
+    rollout = Rollout(
+        build(robot, scenario.controller, scenario.task, simulation.dt),
+        KinematicPlant(),
+        motion,
+        goal_of(scenario.task, robot, simulation.tolerance),
+        vector_of(scenario.robot.q0),
+        dt=simulation.dt,
+        time_limit=simulation.time_limit,
+    )
+    return Trial(scenario, trial, robot, motion, rollout)

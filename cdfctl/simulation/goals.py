@@ -1,0 +1,65 @@
+"""When a task is done: the test the rollout makes at every control step.
+
+joint goal   |q_goal - q|_2 <= tolerance
+hold         the same for the pose, and all obstacles' origins beyond the plane of ``until``; without ``until``, at
+             the time limit only
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdfctl.control.controller import difference
+from cdfctl.errors import InputError
+from cdfctl.robots.robot import Robot
+from cdfctl.scenario.schema import BeyondConfig, HoldTask, JointGoalTask, Task
+from cdfctl.simulation.shapes import vector_of
+from cdfctl.types import Array, Scene, State
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A configuration to be at, and what else must be so.
+
+    Attributes:
+        robot: whose joints they are (a continuous one is compared the shorter way round).
+        q: (n,) the configuration, rad.
+        tolerance: greatest 2-norm of the difference, rad.
+        beyond: the plane all obstacles must have passed, or None.
+        only_at_end: the goal counts at the time limit only.
+    """
+
+    robot: Robot
+    q: Array
+    tolerance: float
+    beyond: BeyondConfig | None = None
+    only_at_end: bool = False
+
+    def reached(self, state: State, scene: Scene, *, at_end: bool) -> bool:
+        """Whether the task is done in this ``state`` and ``scene``; ``at_end`` at the time limit."""
+        if self.only_at_end and not at_end:
+            return False
+        if self.beyond is not None and not passed(scene, self.beyond):
+            return False
+        return float(np.linalg.norm(difference(self.q, state.q, self.robot.continuous))) <= self.tolerance
+
+
+def goal_of(task: Task, robot: Robot, tolerance: float) -> Goal:
+    """The goal of a scenario's task."""
+    match task:
+        case JointGoalTask():
+            return Goal(robot, vector_of(task.goal), tolerance)
+        case HoldTask():
+            beyond = task.until.obstacles_beyond if task.until is not None else None
+            return Goal(robot, vector_of(task.pose), tolerance, beyond, only_at_end=beyond is None)
+        case _:
+            raise InputError(f"no goal is known for the task '{task.type}'", hint="allowed: joint-goal, hold")
+
+
+def passed(scene: Scene, beyond: BeyondConfig) -> bool:
+    """Whether every obstacle's origin is on the named side of the plane."""
+    along = scene.poses[:, "xyz".index(beyond.axis)]
+    value = float(vector_of([beyond.value])[0])
+    return bool(np.all(along < value) if beyond.side == "below" else np.all(along > value))
