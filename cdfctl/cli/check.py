@@ -2,5 +2,38 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 
-def check(): ...
+from cdfctl.cli import options
+from cdfctl.cli.console import write, write_json
+
+
+def check(
+    scenario: options.Scenario,
+    controller: options.Controller = None,
+    seed: options.Seed = None,
+    trial: options.Trial = 0,
+    settings: options.Settings = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
+) -> None:
+    """Validate a scenario, also against its robot, and run nothing."""
+    from cdfctl.scenario.library import load_scenario
+    from cdfctl.scenario.problems import ScenarioErrors
+    from cdfctl.simulation.assemble import assemble
+
+    try:
+        file = load_scenario(scenario, options.overrides(settings, controller, seed))
+        wired = assemble(file, trial=trial)
+    except ScenarioErrors as errors:
+        if json:
+            write_json({"file": errors.file, "valid": False, "problems": [asdict(p) for p in errors.problems]})
+        raise
+    if json:
+        write_json({"file": file.shown, "valid": True, "problems": []})
+    elif not quiet:
+        count = len(wired.scenario.obstacles)
+        obstacles = "1 obstacle" if count == 1 else f"{count} obstacles"
+        robot = f"{wired.robot.name} ({wired.robot.n} joints)"
+        write(f"{file.shown}: valid: {robot}, {obstacles}, {wired.scenario.controller.variant}")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import sys
-import tempfile
 import time
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import gettempdir
 
 from cdfctl import __version__
 from cdfctl.errors import CdfctlError
@@ -55,7 +55,7 @@ def _write_log(text: str) -> Path | None:
     from cdfctl.cache import cache_dir
 
     name = time.strftime("bug-%Y%m%d-%H%M%S.log")
-    for folder in (cache_dir() / "log", Path(tempfile.gettempdir())):
+    for folder in (cache_dir() / "log", Path(gettempdir())):
         try:
             folder.mkdir(parents=True, exist_ok=True)
             path = folder / name

@@ -1,6 +1,82 @@
-"""``cdfctl run``"""
+"""``cdfctl run``: one closed-loop run, its summary, and its folder."""
 
 from __future__ import annotations
 
+import sys
+from contextlib import suppress
+from typing import TYPE_CHECKING
 
-def run(): ...
+from cdfctl.cli import options
+from cdfctl.cli.console import note, show, stderr, write_json
+from cdfctl.errors import PlantError
+
+if TYPE_CHECKING:
+    from cdfctl.simulation.assemble import Trial
+    from cdfctl.simulation.result import RunResult
+
+INTERRUPTED = 130
+
+
+def run(
+    scenario: options.Scenario,
+    controller: options.Controller = None,
+    seed: options.Seed = None,
+    trial: options.Trial = 0,
+    settings: options.Settings = None,
+    out: options.RunFolder = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+    debug: options.Debug = False,
+) -> int:
+    """Run a scenario once, judge it, and write a run folder."""
+    from cdfctl.scenario.library import load_scenario
+    from cdfctl.simulation.assemble import assemble
+    from cdfctl.simulation.run_folder import check_target, default_folder, write_run
+
+    file = load_scenario(scenario, options.overrides(settings, controller, seed))
+    wired = assemble(file, trial=trial)
+    folder = out if out is not None else default_folder(wired.scenario, trial)
+    check_target(folder)
+    finished = follow(wired, quiet=quiet)
+    result = wired.result()
+    document = write_run(folder, result)
+    if json:
+        write_json(document)
+    elif not quiet:
+        from cdfctl.report.run_summary import run_summary
+
+        show(run_summary(result, document["run_dir"], wired.robot.tip, wired.robot.notes))
+    if not finished:
+        note(f"cdfctl: interrupted after {len(result.trajectory.u)} steps; they are in {document['run_dir']}")
+        return INTERRUPTED
+    return status_of(result)
+
+
+def follow(wired: Trial, *, quiet: bool) -> bool:
+    """Run to the end, with a progress bar where standard error is a terminal; False if interrupted on the way."""
+    steps = wired.run()
+    with suppress(KeyboardInterrupt):
+        if quiet or not sys.stderr.isatty():
+            for _ in steps:
+                pass
+            return True
+        from rich.progress import BarColumn, Progress, TextColumn
+
+        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[clock]}"))
+        with Progress(*columns, console=stderr(), transient=True) as progress:
+            # The first step of a first run waits for the compiler.
+            bar = progress.add_task("preparing", total=wired.rollout.max_steps, clock="")
+            for step in steps:
+                clock = f"{step.state.t:.1f} of at most {wired.scenario.simulation.time_limit:g} s"
+                progress.update(bar, description=wired.scenario.name, completed=step.index + 1, clock=clock)
+            progress.update(bar, description="judging", clock="")
+        return True
+    return False
+
+
+def status_of(result: RunResult) -> int:
+    """The exit status of a finished run."""
+    if result.verdict.outcome == "error":
+        note(f"cdfctl: error: {result.reason}")
+        return PlantError.exit_status
+    return 0 if result.verdict.success else 1

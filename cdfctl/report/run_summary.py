@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 from rich.console import Group, RenderableType
 from rich.panel import Panel
 from rich.text import Text
 
 from cdfctl.report.tables import bullets, facts
+from cdfctl.simulation.result import RunResult, step_milliseconds
 from cdfctl.types import Outcome, Verdict
 
 STYLES: Mapping[Outcome, str] = {
@@ -23,87 +22,64 @@ STYLES: Mapping[Outcome, str] = {
 }
 
 
-@dataclass(frozen=True)
-class RunReport:
-    """What a summary needs to know.
+def run_summary(result: RunResult, run_dir: str, tip: str, notes: Sequence[str] = ()) -> RenderableType:
+    """The whole summary, legible at 80 columns and without colour.
 
-    Attributes:
-        document: the keys of ``run --json``.
-        verdict: the judge's.
-        trial: which draw of the seed.
-        description: the scenario's one line.
+    Args:
+        result: the run.
+        run_dir: where it was written.
         tip: the frame whose path length is reported.
-        time_limit, dt: of the scenario, s.
-        assumptions: what the source of the scenario leaves open, as the scenario states it.
-        notes: what the robot file states about its geometry.
-        reason: why the outcome is ``error``.
+        notes: what the robot states about its geometry.
     """
-
-    document: Mapping[str, Any]
-    verdict: Verdict
-    trial: int
-    description: str
-    tip: str
-    time_limit: float
-    dt: float
-    assumptions: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
-    reason: str | None = None
-
-
-def run_summary(report: RunReport) -> RenderableType:
-    """The whole summary, legible at 80 columns and without colour."""
-    document, outcome = report.document, report.verdict.outcome
-    title = f"{document['scenario']}: {document['controller']} on {document['robot']}"
+    scenario, style = result.scenario, STYLES[result.verdict.outcome]
     parts: list[RenderableType] = []
-    if report.description:
-        parts += [Text(report.description), Text()]
-    parts += [Text(headline(report), style=f"bold {STYLES[outcome]}"), Text(), facts(figures(report))]
+    if scenario.description:
+        parts += [Text(scenario.description), Text()]
+    parts += [Text(headline(result), style=f"bold {style}"), Text(), facts(figures(result, run_dir, tip))]
+    title = Text(f"{scenario.name}: {scenario.controller.variant} on {result.robot}")
+    panel = Panel(Group(*parts), title=title, title_align="left", border_style=style, padding=(1, 2))
     below: list[RenderableType] = []
-    for heading, items in (("Assumed", report.assumptions), ("Robot model", report.notes)):
+    for heading, items in (("Assumed", scenario.assumptions), ("Robot model", notes)):
         if items:
             below += [Text(heading, style="bold"), bullets(items)]
-    panel = Panel(
-        Group(*parts), title=Text(title), title_align="left", border_style=STYLES[outcome], expand=True, padding=(1, 2)
-    )
     return Group(panel, *below)
 
 
-def headline(report: RunReport) -> str:
+def headline(result: RunResult) -> str:
     """The outcome in one sentence."""
-    verdict = report.verdict
-    steps = report.document["steps"]
+    verdict, simulation = result.verdict, result.scenario.simulation
     match verdict.outcome:
         case "reached":
             return f"REACHED in {seconds(verdict.time_to_reach)}, without contact"
-        case "collision" if verdict.contact is not None:
+        case "collision":
             contact = verdict.contact
-            return f"COLLISION at {seconds(contact.time)}: {contact.link} touches {contact.obstacle}"
+            where = f" at {seconds(contact.time)}: {contact.link} touches {contact.obstacle}" if contact else ""
+            return f"COLLISION{where}"
         case "timeout":
-            return f"TIMEOUT: not reached within {report.time_limit:g} s, without contact"
+            return f"TIMEOUT: not reached within {simulation.time_limit:g} s, without contact"
         case "infeasible":
-            at = seconds(steps * report.dt)
-            return f"INFEASIBLE: no velocity satisfies all constraints at {at}, and the run stops there"
-        case _:
-            return f"{verdict.outcome.upper()}: {report.reason or 'the run did not finish'}"
+            return f"INFEASIBLE at {seconds(float(result.trajectory.t[-1]))}: no velocity satisfies all constraints"
+        case "error":
+            return f"ERROR at {seconds(float(result.trajectory.t[-1]))}: {result.reason or 'the run did not finish'}"
 
 
-def figures(report: RunReport) -> list[tuple[str, str]]:
+def figures(result: RunResult, run_dir: str, tip: str) -> list[tuple[str, str]]:
     """Names and values with units."""
-    document, verdict = report.document, report.verdict
-    steps = int(document["steps"])
-    infeasible = int(document["infeasible_steps"])
-    share = f" of {steps}, each handled as the scenario's on_infeasible says" if infeasible else f" of {steps}"
-    times = document["step_ms"]
+    verdict, scenario = result.verdict, result.scenario
+    steps = len(result.trajectory.u)
+    infeasible = f"{result.infeasible_steps} of {steps}"
+    if result.infeasible_steps:
+        infeasible += f" (on_infeasible: {scenario.controller.on_infeasible})"
+    times = step_milliseconds(result.trajectory)
     return [
         ("time to reach", seconds(verdict.time_to_reach)),
-        ("path of the tip", f"{verdict.path_length:.3f} m ({report.tip})"),
+        ("path of the tip", f"{verdict.path_length:.3f} m ({tip})"),
         ("path of the joints", f"{verdict.joint_path:.3f} rad"),
         ("least clearance", clearance(verdict)),
-        ("infeasible steps", f"{infeasible}{share}"),
+        ("infeasible steps", infeasible),
         ("step time", f"{milliseconds(times['p50'])} median, {milliseconds(times['p99'])} p99"),
-        ("draw", f"seed {document['seed']}, trial {report.trial}"),
-        ("run folder", str(document["run_dir"])),
+        ("draw", f"seed {scenario.seed}, trial {result.trial}"),
+        ("run folder", run_dir),
     ]
 
 

@@ -1,0 +1,251 @@
+"""``cdfctl run``: outcomes, statuses, the document, the folder."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import pty
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cdfctl.errors import PlantError
+from cdfctl.simulation.plant import KinematicPlant
+
+KEYS = {
+    "scenario": str,
+    "controller": str,
+    "robot": str,
+    "seed": int,
+    "outcome": str,
+    "success": bool,
+    "time_to_reach_s": float | None,
+    "steps": int,
+    "path_length_m": float,
+    "joint_path_rad": float,
+    "min_clearance_m": float | None,
+    "collision_time_s": float | None,
+    "infeasible_steps": int,
+    "step_ms": dict,
+    "run_dir": str,
+}
+FILES = {"scenario.yaml", "result.json", "trajectory.npz"}
+NEVER = "simulation.time_limit=0.2"
+
+
+def arrays(folder: Path) -> dict[str, np.ndarray]:
+    with np.load(folder / "trajectory.npz") as file:
+        return {name: file[name] for name in file.files}
+
+
+def test_a_run_that_reaches_is_0_with_a_summary_and_a_folder(cli, small: Path):
+    result = cli("run", small.name)
+    assert (result.status, result.err) == (0, "")
+    assert "REACHED" in result.out
+    assert "The disc is ours." in result.out
+    assert max(map(len, result.out.splitlines())) <= 80
+    folder = small.parent / "runs" / "small-sdf-tvcbf-qp-0-0"
+    assert {path.name for path in folder.iterdir()} == FILES
+    assert str(folder.relative_to(small.parent)) in result.out
+
+
+def test_json_is_one_document_with_the_contract_s_keys(cli, small: Path):
+    result = cli("run", small.name, "--json")
+    document = result.document()
+    assert (result.status, result.err) == (0, "")
+    assert list(document) == list(KEYS)
+    for key, kind in KEYS.items():
+        assert isinstance(document[key], kind), key
+    assert set(document["step_ms"]) == {"p50", "p99", "max"}
+    assert document["success"] is True
+    assert document["outcome"] == "reached"
+    record = json.loads((small.parent / document["run_dir"] / "result.json").read_text())
+    assert {key: record[key] for key in document} == document
+
+
+def test_a_run_without_obstacles_has_no_clearance(cli, small: Path):
+    result = cli("run", small.name, "--json", "--set", "obstacles=[]")
+    assert result.status == 0
+    assert result.document()["min_clearance_m"] is None
+
+
+def test_quiet_says_nothing(cli, small: Path):
+    result = cli("run", small.name, "--quiet")
+    assert (result.status, result.out, result.err) == (0, "", "")
+
+
+def test_not_reached_is_1(cli, small: Path):
+    result = cli("run", small.name, "--set", NEVER, "--json")
+    assert result.status == 1
+    assert result.document()["outcome"] == "timeout"
+    assert result.document()["time_to_reach_s"] is None
+
+
+def test_a_collision_is_1_and_names_link_and_obstacle(cli, small: Path):
+    disc = ["--set", "obstacles[0].position=[6.0,2.0,0.0]", "--set", "obstacles[0].velocity=[-8.0,0.0,0.0]"]
+    result = cli("run", small.name, *disc, "--controller", "sdf-cbf-qp", "--set", "task.goal=[1.5,0.5]")
+    assert result.status == 1
+    assert "COLLISION at" in result.out
+    assert "touches disc" in result.out
+    document = cli(
+        "run", small.name, *disc, "--controller", "sdf-cbf-qp", "--set", "task.goal=[1.5,0.5]", "--json"
+    ).document()
+    assert document["outcome"] == "collision"
+    assert document["min_clearance_m"] <= 1e-6
+    assert math.isfinite(document["collision_time_s"])
+
+
+def test_a_plant_that_fails_is_4_and_the_partial_run_is_kept(cli, small: Path, monkeypatch):
+    steps = KinematicPlant.step
+
+    def fail(self, state, u, dt):
+        if state.t > 0.05:
+            raise PlantError("the cable came loose")
+        return steps(self, state, u, dt)
+
+    monkeypatch.setattr(KinematicPlant, "step", fail)
+    result = cli("run", small.name, "--json")
+    assert result.status == 4
+    assert "the cable came loose" in result.err
+    assert result.document()["outcome"] == "error"
+    assert len(arrays(small.parent / result.document()["run_dir"])["t"]) == 2
+
+
+def test_an_interrupt_keeps_what_was_done(process, small: Path):
+    """In a process of its own, as a user's Ctrl-C."""
+    slow = ["--set", "simulation.dt=0.0001", "--set", "simulation.time_limit=60.0", "--set", "controller.gain=0.0001"]
+    child = subprocess.Popen(
+        [sys.executable, "-m", "cdfctl", "run", small.name, *slow, "--json"],
+        cwd=small.parent,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    time.sleep(0.1)
+    deadline = time.monotonic() + 120
+    # The kernels are compiled and the loop runs once the process has used some seconds of the processor.
+    while time.monotonic() < deadline and _processor_seconds(child.pid) < 8:
+        time.sleep(0.1)
+    child.send_signal(signal.SIGINT)
+    out, err = child.communicate(timeout=120)
+    assert child.returncode == 130
+    assert "Traceback" not in err
+    assert "interrupted" in err
+    if out:
+        document = json.loads(out)
+        assert document["success"] is False
+        assert (small.parent / document["run_dir"] / "trajectory.npz").exists()
+
+
+def _processor_seconds(pid: int) -> float:
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except FileNotFoundError:
+        return math.inf
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def test_the_draw_depends_on_seed_and_trial_alone(cli, small: Path):
+    def place(*options: object) -> float:
+        document = cli("run", small.name, "--json", *options).document()
+        return float(arrays(small.parent / document["run_dir"])["obstacle_pose"][0, 0, 1])
+
+    first = place()
+    assert place("--seed", 0, "--trial", 0) == first
+    assert place("--controller", "sdf-cbf-qp") == first
+    assert place("--seed", 1) != first
+    assert place("--trial", 1) != first
+
+
+def test_a_run_s_own_scenario_gives_the_same_run(cli, small: Path):
+    first = small.parent / cli("run", small.name, "--json", "--trial", 3).document()["run_dir"]
+    again = cli("run", f"{first}/scenario.yaml", "--json", "--out", "again")
+    assert again.status == 0
+    one, two = arrays(first), arrays(small.parent / "again")
+    assert one.keys() == two.keys()
+    for name in one.keys() - {"step_time"}:
+        np.testing.assert_array_equal(one[name], two[name])
+
+
+def test_a_rerun_replaces_its_own_folder(cli, small: Path):
+    assert cli("run", small.name, "--out", "here").status == 0
+    assert cli("run", small.name, "--out", "here", "--set", NEVER).status == 1
+    assert json.loads((small.parent / "here" / "result.json").read_text())["outcome"] == "timeout"
+
+
+def test_check_says_what_it_found_and_writes_nothing(cli, small: Path):
+    result = cli("check", small.name)
+    assert (result.status, result.err) == (0, "")
+    assert result.out == "small.yaml: valid: planar (2 joints), 1 obstacle, sdf-tvcbf-qp\n"
+    assert cli("check", small.name, "--quiet").out == ""
+    assert cli("check", small.name, "--json").document() == {"file": "small.yaml", "valid": True, "problems": []}
+    assert list(small.parent.iterdir()) == [small]
+
+
+@pytest.mark.parametrize("scenario", ["S1", "S2", "S3", "C1", "C2", "C3", "planar-1"])
+def test_every_shipped_scenario_that_can_run_is_valid(cli, here: Path, scenario):
+    assert cli("check", scenario).status == 0
+
+
+@pytest.mark.skipif(not hasattr(pty, "openpty"), reason="no pseudo-terminal")
+@pytest.mark.parametrize("quiet", [False, True])
+def test_a_progress_bar_appears_on_a_terminal_only_and_never_on_standard_output(small: Path, quiet):
+    leader, follower = pty.openpty()
+    command = [sys.executable, "-m", "cdfctl", "run", small.name, "--json", *(["--quiet"] if quiet else [])]
+    environment = {**os.environ, "TERM": "xterm-256color"}
+    child = subprocess.Popen(command, cwd=small.parent, env=environment, stdout=subprocess.PIPE, stderr=follower)
+    os.close(follower)
+    assert child.stdout is not None
+    out = child.stdout.read()
+    assert child.wait() == 0
+    shown = b""
+    while True:
+        try:
+            part = os.read(leader, 65536)
+        except OSError:  # the other end is closed and everything is read
+            break
+        if not part:
+            break
+        shown += part
+    os.close(leader)
+    child.stdout.close()
+    assert json.loads(out)["success"] is True
+    assert (shown == b"") == quiet
+    if not quiet:
+        assert b"small" in shown
+
+
+def test_no_color_is_honoured_on_a_terminal(small: Path):
+    leader, follower = pty.openpty()
+    environment = {**os.environ, "TERM": "xterm-256color", "NO_COLOR": "1"}
+    child = subprocess.Popen(
+        [sys.executable, "-m", "cdfctl", "run", small.name],
+        cwd=small.parent,
+        env=environment,
+        stdout=follower,
+        stderr=subprocess.PIPE,
+    )
+    os.close(follower)
+    shown = b""
+    while True:
+        try:
+            part = os.read(leader, 65536)
+        except OSError:
+            break
+        if not part:
+            break
+        shown += part
+    assert child.wait() == 0
+    os.close(leader)
+    assert child.stderr is not None
+    child.stderr.close()
+    assert b"REACHED" in shown
+    for colour in (b"[31m", b"[32m", b"[33m", b"[1;32m"):
+        assert colour not in shown
