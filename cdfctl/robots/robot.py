@@ -176,6 +176,8 @@ def load_robot(
         "position_limits": {**file.position_limits, **(position_limits or {})},
         "velocity_limits": {} if speed is not None else {**file.velocity_limits, **named},
         "tip": tip if tip is not None else file.tip,
+        # The file's home is for the joints the file leaves free.
+        "home": file.home if set(lock or ()) <= set(file.lock) else None,
     }
     return assemble_robot(file.model_copy(update=changes), urdf, own_dirs, speed)
 
