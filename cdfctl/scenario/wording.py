@@ -38,8 +38,8 @@ def validate(data: Any) -> tuple[Scenario | None, list[Complaint]]:
     scenario, complaints = validate_as(Scenario, data)
     if scenario is None and isinstance(data, dict):
         # These run inside the model too, but only once all its parts are valid.
-        known = {(message, place) for message, _, place in complaints}
-        complaints += [c for c in inconsistencies(data) if (c[0], c[2]) not in known]
+        known = {place for _, _, place in complaints}
+        complaints += [c for c in inconsistencies(data) if c[2] not in known]
     return scenario, complaints
 
 
