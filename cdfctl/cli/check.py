@@ -21,10 +21,11 @@ def check(
     """Validate a scenario, also against its robot, and run nothing."""
     from cdfctl.scenario.library import load_scenario
     from cdfctl.scenario.problems import ScenarioErrors
-    from cdfctl.simulation.assemble import assemble
 
     try:
         file = load_scenario(scenario, options.overrides(settings, controller, seed))
+        from cdfctl.simulation.assemble import assemble  # heavy: once the file is known to be good
+
         wired = assemble(file, trial=trial)
     except ScenarioErrors as errors:
         if json:

@@ -30,10 +30,13 @@ def run(
 ) -> int:
     """Run a scenario once, judge it, and write a run folder."""
     from cdfctl.scenario.library import load_scenario
+
+    file = load_scenario(scenario, options.overrides(settings, controller, seed))
+
+    # The heavy imports, once the file is known to be good.
     from cdfctl.simulation.assemble import assemble
     from cdfctl.simulation.run_folder import check_target, default_folder, write_run
 
-    file = load_scenario(scenario, options.overrides(settings, controller, seed))
     wired = assemble(file, trial=trial)
     folder = out if out is not None else default_folder(wired.scenario, trial)
     check_target(folder)

@@ -83,7 +83,7 @@ def test_check_json_lists_the_problems(cli, here: Path):
     assert document["valid"] is False
     (problem,) = document["problems"]
     assert problem["field"] == "obstacles[0].velocty"
-    assert problem["line"] == 12
+    assert problem["line"] == 13
     assert "velocity" in problem["hint"]
 
 
@@ -132,7 +132,7 @@ def test_a_scenario_that_is_no_readable_file_is_refused(cli, here: Path, argumen
         (["--set", "controller.alpha=-1"], "controller.alpha"),
         (["--set", "obstacles[7].velocity=[0,0,0]"], "obstacles"),
         (["--set", "=1"], "path"),
-        (["--set", "robot.q0=[0,0,0]"], "joint"),
+        (["--set", "robot.q0=[.nan,0]"], "robot.q0[0]"),
         (["--seed", "99999999999999999999"], "seed"),
     ],
 )
