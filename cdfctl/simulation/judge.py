@@ -129,7 +129,7 @@ class Sweep:
             for i, reach in enumerate(self.clearance.reach):
                 turning = self.motion.max_angular_speed(i, t0, t1)
                 obstacle[k, i] = self.motion.max_speed(i, t0, t1) + turning * reach
-        return (robot[:, :, None] + obstacle[:, None, :]).reshape(len(self.t) - 1, -1)
+        return (robot[:, :, None] + obstacle[:, None, :]).reshape(len(self.t) - 1, self.at_steps.shape[1])
 
     def _place(self, k: int, t: float) -> None:
         """Move everything to time ``t`` within step ``k``."""
