@@ -11,6 +11,7 @@ import numpy as np
 from cdfctl.errors import InputError, name_hint
 from cdfctl.robots.bodies import Body, body_names, convex_pieces, geometry_model, merge_bodies, read_bodies
 from cdfctl.robots.joints import check_limits, limited_joints, locked_joints
+from cdfctl.robots.meshes import reason_of
 from cdfctl.robots.robot import Chain, Robot, robot_hash
 from cdfctl.robots.robot_file import RobotFile
 from cdfctl.robots.urdf import Urdf, read_urdf
@@ -74,7 +75,7 @@ def _reduced(urdf: Urdf, locked: Mapping[str, float]) -> tuple[Any, Any]:
             ids = [model.getJointId(name) for name in locked]
             model, (geometry,) = pin.buildReducedModel(model, [geometry], ids, reference)
     except (ValueError, RuntimeError, IndexError) as error:
-        raise InputError(f"{urdf.path}: Pinocchio cannot read it: {' '.join(str(error).split())}") from None
+        raise InputError(f"{urdf.path}: cannot be built: {reason_of(error)}") from None
     return model, geometry
 
 

@@ -24,14 +24,19 @@ def load_vertices(path: Path) -> Array:
     try:
         mesh = coal.MeshLoader().load(str(path))
     except (RuntimeError, ValueError, IndexError) as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"{path}: not a readable mesh: {reason}") from None
+        raise InputError(f"{path}: not a readable mesh: {reason_of(error)}") from None
     vertices = np.array(mesh.vertices(), dtype=np.float64).reshape(-1, 3)
     if vertices.shape[0] == 0:
         raise InputError(f"{path}: the mesh has no vertices")
     if not np.all(np.isfinite(vertices)):
         raise InputError(f"{path}: the mesh has vertices that are not finite")
     return vertices
+
+
+def reason_of(error: Exception) -> str:
+    """What coal or Pinocchio say, in one line, without the place in their source."""
+    text = " ".join(str(error).split())
+    return text.split("message: ")[-1].split(" Hint: ")[0]
 
 
 def check_mesh_file(path: Path) -> None:

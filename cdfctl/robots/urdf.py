@@ -93,6 +93,7 @@ def _parse(path: Path) -> Element:
         raise InputError(f"{path}: not readable as XML: {error}") from None
     if root.tag != "robot":
         raise InputError(f"{path}: the root element is <{root.tag}>, a URDF has <robot>")
+    root.attrib.setdefault("name", path.stem)
     if any("xacro" in str(element.tag) for element in root.iter()):
         raise InputError(f"{path}: contains xacro elements", hint="expand it first: xacro model.xacro > model.urdf")
     return root
