@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from cdfctl.errors import InputError, MissingError
@@ -72,7 +73,9 @@ def test_a_robot_file_of_ones_own(arm):
     )
     fingers = robot.pieces[-1]
     assert fingers.joint == 1
-    assert fingers.vertices.shape == (12, 3)  # of two boxes of 8, side by side along the diagonal
+    assert fingers.vertices.shape == (8, 3)  # two boxes of 0.4 m that have slid apart by 1 m along their length
+    spans = np.linalg.norm(fingers.vertices[:, None] - fingers.vertices[None], axis=2)
+    assert spans.max() == pytest.approx(np.linalg.norm([0.2, 0.1, 1.4]))
     assert load_robot(arm.parent / "mine.yaml", velocity_limits=0.3).velocity_limit.tolist() == [0.3, 0.3]
 
 
