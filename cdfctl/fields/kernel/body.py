@@ -16,7 +16,7 @@ import numpy as np
 
 from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.sets import ConvexSets, pack
-from cdfctl.fields.kernel.vec import Rot, Vec, add, compose, cross, dot, rot, rotate, scale, store, sub, vec
+from cdfctl.fields.kernel.vec import Rot, Vec, add, compose, cross, dot, rot, rotate, scale, store, store_rot, sub, vec
 from cdfctl.robots.robot import Chain, Robot
 from cdfctl.types import Array, IntArray
 
@@ -123,13 +123,6 @@ def turn(k: Vec, angle: float) -> Rot:
         (c * x * y + s * z, 1.0 - c * (x * x + z * z), c * y * z - s * x),
         (c * x * z - s * y, c * y * z + s * x, 1.0 - c * (x * x + y * y)),
     )
-
-
-@njit
-def store_rot(array: Array, i: int, r: Rot) -> None:
-    """Matrix i of a (k, 3, 3) array becomes ``r``."""
-    for k in range(3):
-        array[i, 0, k], array[i, 1, k], array[i, 2, k] = r[0][k], r[1][k], r[2][k]
 
 
 @njit

@@ -32,7 +32,7 @@ from cdfctl.fields.kernel.vec import (
     scale,
     sub,
     transpose,
-    vec,
+    vec3,
 )
 
 
@@ -75,9 +75,9 @@ def signed_distance(
     ``guess`` is a direction from A to B to start from: the normal of a like query, or zero for none. Where the distance
     exceeds ``cutoff`` (m), the answer may be any d that is above the cutoff and not above the distance.
     """
-    r_a, r_b = sets_a.radius[i], sets_b.radius[j]
+    r_a, r_b = sets_a.info[i].radius, sets_b.info[j].radius
     if not dot(guess, guess) > 0.0:
-        guess = sub(add(rotate(r, vec(sets_b.centre, j)), t), vec(sets_a.centre, i))
+        guess = sub(add(rotate(r, vec3(sets_b.info[j].centre)), t), vec3(sets_a.info[i].centre))
     if not dot(guess, guess) > 0.0:
         guess = (0.0, 0.0, 1.0)
     core_cutoff = max(0.0, cutoff + r_a + r_b)
@@ -94,7 +94,7 @@ def _touching(
     sets_a: ConvexSets, i: int, sets_b: ConvexSets, j: int, r: Rot, t: Vec, shared: Vec, v: Vec, work: Work
 ) -> Contact:
     """The contact of cores that touch (their nearest points ``v`` apart, or less than rounding) or overlap."""
-    r_a, r_b = sets_a.radius[i], sets_b.radius[j]
+    r_a, r_b = sets_a.info[i].radius, sets_b.info[j].radius
     core = core_depth(sets_a, i, sets_b, j, r, t, work.polytope)
     a, depth, normal = core.a, core.depth, core.normal
     if core.flat:
@@ -131,13 +131,14 @@ def lower_bound(body: Body, k: int, parts: Parts, p: int, r: Rot, t: Vec) -> flo
 
     It is the gap between the piece's bounding box and the part's bounding ball, -inf where they overlap.
     """
-    c = add(rotate(r, vec(parts.sets.centre, p)), t)
-    lower, upper = body.sets.lower, body.sets.upper
-    x = max(lower[k, 0] - c[0], 0.0, c[0] - upper[k, 0])
-    y = max(lower[k, 1] - c[1], 0.0, c[1] - upper[k, 1])
-    z = max(lower[k, 2] - c[2], 0.0, c[2] - upper[k, 2])
-    gap = norm((x, y, z)) - parts.sets.reach[p]
-    return gap - body.sets.radius[k] - parts.sets.radius[p] if gap > 0.0 else -np.inf
+    piece, part = body.sets.info[k], parts.sets.info[p]
+    c = add(rotate(r, vec3(part.centre)), t)
+    lower, upper = piece.lower, piece.upper
+    x = max(lower[0] - c[0], 0.0, c[0] - upper[0])
+    y = max(lower[1] - c[1], 0.0, c[1] - upper[1])
+    z = max(lower[2] - c[2], 0.0, c[2] - upper[2])
+    gap: float = norm((x, y, z)) - part.reach
+    return gap - piece.radius - part.radius if gap > 0.0 else -np.inf
 
 
 def new_work() -> Work:

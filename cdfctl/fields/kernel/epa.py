@@ -68,7 +68,7 @@ class CoreDepth(NamedTuple):
 @njit
 def core_depth(sets_a: ConvexSets, i: int, sets_b: ConvexSets, j: int, r: Rot, t: Vec, polytope: Polytope) -> CoreDepth:
     """Penetration depth of core i of A and core j of B, whose frame is (r, t) in that of A."""
-    size = sets_a.reach[i] + sets_b.reach[j]
+    size = sets_a.info[i].reach + sets_b.info[j].reach
     flat, flat_normal = _start(sets_a, i, sets_b, j, r, t, FLAT * size, polytope)
     if flat:
         return CoreDepth(0.0, flat_normal, (0.0, 0.0, 0.0), True)

@@ -74,7 +74,7 @@ def core_distance(
     v, size = w, 1
     store_vertex(simplex, 0, w, a)
     best_a, best_vv = a, dot(w, w)
-    reach = sets_a.reach[i] + sets_b.reach[j]
+    reach = sets_a.info[i].reach + sets_b.info[j].reach
     touch2 = (TOUCH * reach) ** 2
     for _ in range(MAX_STEPS):
         if best_vv <= touch2:

@@ -47,7 +47,19 @@ def njit(function: Callable[P, T]) -> Callable[P, T]:
         compiled = numba.njit(cache=folder is not None, **OPTIONS)(function)
     finally:
         config.CACHE_DIR = theirs
-    return cast(Callable[P, T], compiled)
+    return cast(Callable[P, T], _plain_integers(compiled))
+
+
+def _plain_integers(compiled: Any) -> Any:
+    """``f(x, 0)`` and ``f(x, 1)`` in compiled code use one ``f`` for all integers, not one for each constant."""
+    template = compiled.get_call_template
+    unliteral: Any = numba.types.unliteral
+
+    def without_constants(args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
+        return template(tuple(unliteral(a) for a in args), {name: unliteral(a) for name, a in kws.items()})
+
+    compiled.get_call_template = without_constants
+    return compiled
 
 
 @cache

@@ -8,31 +8,29 @@ import numpy as np
 
 from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.sets import ConvexSets, pack
-from cdfctl.fields.kernel.vec import Rot, Vec, add, cross, dot, rot, sub, vec
+from cdfctl.fields.kernel.vec import Rot, Vec, add, cross, dot, rot, store_rot, sub, vec
 from cdfctl.robots.convex import ConvexSet, convex_sets
 from cdfctl.types import Array, IntArray, Scene, Shape
 
 
 class Parts(NamedTuple):
-    """m obstacles of p convex parts. Only poses and twists change from step to step.
+    """m obstacles of p convex parts. Only the poses and twists change from step to step.
 
     Attributes:
         sets: the p parts, in the frame of their obstacle.
         obstacle: (p,) the obstacle a part belongs to.
         first: (m+1,) the parts of obstacle o are first[o] … first[o+1] - 1.
-        rotation: (m, 3, 3) and
-        origin: (m, 3) m, the obstacle's frame in the world.
-        velocity: (m, 3) m/s, of that origin.
-        angular: (m, 3) rad/s, world axes.
+        pose: (m, 7) of the obstacles in the world: origin (m), quaternion x y z w.
+        rotation: (m, 3, 3) the matrix of that quaternion.
+        twist: (m, 6) velocity of the origin (m/s), angular velocity (rad/s), world axes.
     """
 
     sets: ConvexSets
     obstacle: IntArray
     first: IntArray
+    pose: Array
     rotation: Array
-    origin: Array
-    velocity: Array
-    angular: Array
+    twist: Array
 
 
 class SceneParts:
@@ -47,14 +45,8 @@ class SceneParts:
         if self._parts is None or scene.shapes is not self._shapes:
             self._parts, self._shapes = parts_of(scene.shapes), scene.shapes
         parts = self._parts
-        parts.origin[:] = scene.poses[:, :3]
-        parts.velocity[:] = scene.twists[:, :3]
-        parts.angular[:] = scene.twists[:, 3:]
-        x, y, z, w = scene.poses[:, 3:].T
-        r = parts.rotation
-        r[:, 0, 0], r[:, 0, 1], r[:, 0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)
-        r[:, 1, 0], r[:, 1, 1], r[:, 1, 2] = 2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)
-        r[:, 2, 0], r[:, 2, 1], r[:, 2, 2] = 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
+        parts.pose[:], parts.twist[:] = scene.poses, scene.twists
+        turn_obstacles(parts.pose, parts.rotation)
         return parts
 
 
@@ -68,21 +60,35 @@ def parts_of(shapes: tuple[Shape, ...]) -> Parts:
         sets=pack(sets),
         obstacle=np.repeat(np.arange(m, dtype=np.int64), counts),
         first=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
+        pose=np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (m, 1)),
         rotation=np.tile(np.eye(3), (m, 1, 1)),
-        origin=np.zeros((m, 3)),
-        velocity=np.zeros((m, 3)),
-        angular=np.zeros((m, 3)),
+        twist=np.zeros((m, 6)),
     )
+
+
+@njit
+def turn_obstacles(pose: Array, rotation: Array) -> None:
+    """The rotation matrices (m, 3, 3) of the quaternions of ``pose`` (m, 7)."""
+    for o in range(pose.shape[0]):
+        x, y, z, w = pose[o, 3], pose[o, 4], pose[o, 5], pose[o, 6]
+        s = 2.0 / (x * x + y * y + z * z + w * w)
+        r = (
+            (1.0 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)),
+            (s * (x * y + z * w), 1.0 - s * (x * x + z * z), s * (y * z - x * w)),
+            (s * (x * z - y * w), s * (y * z + x * w), 1.0 - s * (x * x + y * y)),
+        )
+        store_rot(rotation, o, r)
 
 
 @njit
 def obstacle_pose(parts: Parts, o: int) -> tuple[Rot, Vec]:
     """Rotation and translation of obstacle o in the world."""
-    return rot(parts.rotation, o), vec(parts.origin, o)
+    return rot(parts.rotation, o), vec(parts.pose, o)
 
 
 @njit
 def time_derivative(parts: Parts, o: int, b: Vec, normal: Vec) -> float:
     """∂d/∂t = νᵀ (v + ω × (b - origin)) for a witness ``b`` (world) on obstacle o; ν is ``normal``."""
-    v = add(vec(parts.velocity, o), cross(vec(parts.angular, o), sub(b, vec(parts.origin, o))))
-    return dot(normal, v)
+    origin, v = vec(parts.pose, o), vec(parts.twist, o)
+    angular = (parts.twist[o, 3], parts.twist[o, 4], parts.twist[o, 5])
+    return dot(normal, add(v, cross(angular, sub(b, origin))))

@@ -17,43 +17,51 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import sqrt
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.vec import Vec
 from cdfctl.types import Array, IntArray
 
+Records: TypeAlias = NDArray[Any]
+
 SCAN_LIMIT = 24  # sets with more vertices than this climb; a scan of 24 takes as long as a climb
+
+
+INFO = np.dtype(
+    [
+        ("first", np.int64),  # the vertices of the set are first … last - 1
+        ("last", np.int64),
+        ("table", np.int64),  # where its table of starts begins in ``start``, -1 for a set that scans
+        ("cells", np.int64),  # number of table cells along an edge of the cube
+        ("disc", np.float64),  # m
+        ("radius", np.float64),  # m
+        ("reach", np.float64),  # radius of a ball around the core, m; its centre is the middle of the box
+        ("lower", np.float64, 3),  # bounding box of the core
+        ("upper", np.float64, 3),
+        ("centre", np.float64, 3),
+    ],
+    align=True,
+)
+"""What is known of one set. A record, not an array for each: few arguments keep calls and their compilation short."""
 
 
 class ConvexSets(NamedTuple):
     """k convex sets over V vertices, E directed edges.
 
     Attributes:
-        first: (k+1,) the vertices of set i are ``vertices[first[i]:first[i+1]]``.
+        info: (k,) of :data:`INFO`.
         vertices: (V, 3) m.
-        disc, radius: (k,) m.
-        lower, upper: (k, 3) bounding box of the core.
-        centre, reach: (k, 3), (k,) a ball around the core: the middle of that box, and the farthest core point from it.
-        table: (k,) where the set's table of starts begins in ``start``, -1 for a set that scans.
-        cells: (k,) number of table cells along an edge of the cube.
         start: (T,) vertex to start from, for each cell of each cube.
         edge: (V+1,) the neighbours of vertex v are ``neighbour[edge[v]:edge[v+1]]``.
         neighbour: (E,) vertex indices.
     """
 
-    first: IntArray
+    info: Records
     vertices: Array
-    disc: Array
-    radius: Array
-    lower: Array
-    upper: Array
-    centre: Array
-    reach: Array
-    table: IntArray
-    cells: IntArray
     start: IntArray
     edge: IntArray
     neighbour: IntArray
@@ -72,42 +80,33 @@ class ConvexSetLike(Protocol):
 
 def pack(sets: Sequence[ConvexSetLike]) -> ConvexSets:
     """The arrays of ``sets``, in their order."""
-    k = len(sets)
-    counts = [len(s.vertices) for s in sets]
-    first = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)]).astype(np.int64)
-    vertices = np.ascontiguousarray(np.concatenate([s.vertices for s in sets] or [np.zeros((0, 3))]), dtype=np.float64)
-    disc = np.array([s.disc for s in sets], dtype=np.float64)
-    lower, upper, reach = np.zeros((k, 3)), np.zeros((k, 3)), np.zeros(k)
-    table, cells = np.full(k, -1, dtype=np.int64), np.zeros(k, dtype=np.int64)
+    info = np.zeros(len(sets), dtype=INFO)
+    vertices = np.concatenate([np.asarray(s.vertices, dtype=np.float64) for s in sets] or [np.zeros((0, 3))])
     starts: list[IntArray] = [np.zeros(0, dtype=np.int64)]
     neighbours: list[IntArray] = [np.zeros(0, dtype=np.int64)]
     degree = np.zeros(len(vertices), dtype=np.int64)
-    filled = 0
-    for i, s in enumerate(sets):
+    first = filled = 0
+    for record, s in zip(info, sets, strict=True):
         points, flat = np.asarray(s.vertices, dtype=np.float64), np.array([s.disc, s.disc, 0.0])
-        lower[i], upper[i] = points.min(axis=0) - flat, points.max(axis=0) + flat
-        offset = points - 0.5 * (lower[i] + upper[i])
-        reach[i] = np.hypot(np.hypot(offset[:, 0], offset[:, 1]) + s.disc, offset[:, 2]).max()
-        if len(points) <= SCAN_LIMIT:
-            continue
-        degrees, adjacent = _hull_edges(points)
-        degree[first[i] : first[i + 1]] = degrees
-        neighbours.append(adjacent + first[i])
-        cells[i] = 8 if len(points) < 400 else 16 if len(points) < 2000 else 32
-        table[i] = filled
-        starts.append(_cube_table(points, degrees > 0, int(cells[i])) + first[i])
-        filled += len(starts[-1])
+        count = len(points)
+        lower, upper = points.min(axis=0) - flat, points.max(axis=0) + flat
+        x, y, z = (points - 0.5 * (lower + upper)).T
+        record["first"], record["last"], record["table"] = first, first + count, -1
+        record["disc"], record["radius"] = s.disc, s.radius
+        record["lower"], record["upper"], record["centre"] = lower, upper, 0.5 * (lower + upper)
+        record["reach"] = np.hypot(np.hypot(x, y) + s.disc, z).max()
+        if count > SCAN_LIMIT:
+            degrees, adjacent = _hull_edges(points)
+            cells = 8 if count < 400 else 16 if count < 2000 else 32
+            record["table"], record["cells"] = filled, cells
+            degree[first : first + count] = degrees
+            neighbours.append(adjacent + first)
+            starts.append(_cube_table(points, degrees > 0, cells) + first)
+            filled += len(starts[-1])
+        first += count
     return ConvexSets(
-        first=first,
-        vertices=vertices,
-        disc=disc,
-        radius=np.array([s.radius for s in sets], dtype=np.float64),
-        lower=lower,
-        upper=upper,
-        centre=0.5 * (lower + upper),
-        reach=reach,
-        table=table,
-        cells=cells,
+        info=info,
+        vertices=np.ascontiguousarray(vertices),
         start=np.concatenate(starts),
         edge=np.concatenate([[0], np.cumsum(degree)]).astype(np.int64),
         neighbour=np.concatenate(neighbours),
@@ -150,13 +149,17 @@ def _cube_table(points: Array, usable: np.typing.NDArray[np.bool_], cells: int) 
 @njit
 def support(sets: ConvexSets, i: int, s: Vec) -> Vec:
     """A point of core i farthest in direction ``s``, in the frame of the set."""
-    v = _scan(sets.vertices, sets.first[i], sets.first[i + 1], s) if sets.table[i] < 0 else _climb(sets, i, s)
+    info = sets.info[i]
+    if info.table < 0:
+        v = _scan(sets.vertices, info.first, info.last, s)
+    else:
+        v = _climb(sets, sets.start[info.table + _cell(s, info.cells)], s)
     x, y, z = sets.vertices[v, 0], sets.vertices[v, 1], sets.vertices[v, 2]
-    if sets.disc[i] > 0.0:
+    if info.disc > 0.0:
         flat = sqrt(s[0] * s[0] + s[1] * s[1])
         if flat > 0.0:
-            x += sets.disc[i] * s[0] / flat
-            y += sets.disc[i] * s[1] / flat
+            x += info.disc * s[0] / flat
+            y += info.disc * s[1] / flat
     return (x, y, z)
 
 
@@ -171,9 +174,9 @@ def _scan(vertices: Array, first: int, last: int, s: Vec) -> int:
 
 
 @njit
-def _climb(sets: ConvexSets, i: int, s: Vec) -> int:
+def _climb(sets: ConvexSets, start: int, s: Vec) -> int:
     vertices, edge, neighbour = sets.vertices, sets.edge, sets.neighbour
-    best: int = sets.start[sets.table[i] + _cell(s, sets.cells[i])]
+    best = start
     value = vertices[best, 0] * s[0] + vertices[best, 1] * s[1] + vertices[best, 2] * s[2]
     here = -1
     while best != here:

@@ -102,8 +102,14 @@ def transpose(r: Rot) -> Rot:
 
 @njit
 def vec(array: Array, i: int) -> Vec:
-    """Row i of a (k, 3) array."""
+    """Row i of a (k, 3) array, or the first three numbers of a wider one."""
     return (array[i, 0], array[i, 1], array[i, 2])
+
+
+@njit
+def vec3(array: Array) -> Vec:
+    """A (3,) array."""
+    return (array[0], array[1], array[2])
 
 
 @njit
@@ -120,3 +126,10 @@ def rot(array: Array, i: int) -> Rot:
         (array[i, 1, 0], array[i, 1, 1], array[i, 1, 2]),
         (array[i, 2, 0], array[i, 2, 1], array[i, 2, 2]),
     )
+
+
+@njit
+def store_rot(array: Array, i: int, r: Rot) -> None:
+    """Matrix i of a (k, 3, 3) array becomes ``r``."""
+    for k in range(3):
+        array[i, 0, k], array[i, 1, k], array[i, 2, k] = r[0][k], r[1][k], r[2][k]
