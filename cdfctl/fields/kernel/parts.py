@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cdfctl.errors import InputError
 from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.sets import ConvexSets, pack
 from cdfctl.fields.kernel.vec import Rot, Vec, add, cross, dot, rot, store_rot, sub, vec
@@ -41,11 +42,17 @@ class SceneParts:
         self._parts: Parts | None = None
 
     def of(self, scene: Scene) -> Parts:
-        """The arrays of ``scene``; they are overwritten by the next call."""
+        """The arrays of ``scene``; they are overwritten by the next call.
+
+        Raises:
+            InputError: a number of the scene is not finite.
+        """
         if self._parts is None or scene.shapes is not self._shapes:
             self._parts, self._shapes = parts_of(scene.shapes), scene.shapes
         parts = self._parts
         parts.pose[:], parts.twist[:] = scene.poses, scene.twists
+        if not (np.isfinite(parts.pose).all() and np.isfinite(parts.twist).all()):
+            raise InputError("the poses and twists of the obstacles must be finite")
         turn_obstacles(parts.pose, parts.rotation)
         return parts
 

@@ -1,0 +1,80 @@
+"""The signed distance field: how far each link is from each obstacle, and how that changes.
+
+    d            signed distance of the surfaces, m, negative in penetration
+    ∂d/∂q_j      = -νᵀ J_a,j         a: witness on the robot, ν: unit normal from robot to obstacle
+    ∂d/∂t        = νᵀ (v + ω × (b - origin))                         b: witness on the obstacle
+
+The links are those a joint moves; a link's distance is the least over its convex pieces, an obstacle's the least over
+its convex parts. In penetration, ν is the direction in which the obstacle leaves the piece soonest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cdfctl.fields.kernel.body import body_of, new_frames
+from cdfctl.fields.kernel.distance import new_work
+from cdfctl.fields.kernel.parts import SceneParts
+from cdfctl.fields.kernel.rows import Answer, link_rows, nearest_rows, new_answer
+from cdfctl.robots.robot import Robot
+from cdfctl.types import FieldQuery, IntArray, Scene, Unit, as_vector
+
+
+class SDF:
+    """The signed distance field of ``robot``. It keeps workspaces, so one instance a thread, but nothing of a query."""
+
+    unit: Unit = "m"
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self._body = body_of(robot)
+        self._frames = new_frames(self._body)
+        self._work = new_work()
+        self._parts = SceneParts()
+
+    def query(self, q: ArrayLike, scene: Scene) -> FieldQuery:
+        """One row an obstacle, in the scene's order: the link nearest to it.
+
+        A row is invalid where no joint can change the distance (the gradient is shorter than 1e-9), and for a robot
+        without geometry, whose distance is +inf.
+
+        Raises:
+            InputError: ``q`` has not n numbers, or a number of ``q`` or of the scene is not finite.
+        """
+        point, parts = as_vector(q, self.robot.n, "q"), self._parts.of(scene)
+        answer = new_answer(len(scene), self.robot.n)
+        nearest_rows(self._body, point, parts, self._frames, self._work, answer)
+        return _rows(answer, np.arange(len(scene), dtype=np.int64))
+
+    def per_link(self, q: ArrayLike, scene: Scene) -> FieldQuery:
+        """One row for every obstacle and link: all links of the first obstacle, in the robot's order, then the next.
+
+        Raises:
+            InputError: as :meth:`query`.
+        """
+        point, parts = as_vector(q, self.robot.n, "q"), self._parts.of(scene)
+        links = len(self.robot.links)
+        answer = new_answer(len(scene) * links, self.robot.n)
+        link_rows(self._body, point, parts, self._frames, self._work, answer)
+        return _rows(answer, np.repeat(np.arange(len(scene), dtype=np.int64), links))
+
+    def contacts(self, q: ArrayLike, scene: Scene, *, sheets: int = 1) -> FieldQuery:
+        """The same as :meth:`per_link`: a link's signed distance has one contact, whatever ``sheets`` allows."""
+        return self.per_link(q, scene)
+
+    def reset(self) -> None:
+        """Nothing to forget: an answer depends on its question only."""
+
+
+def _rows(answer: Answer, obstacle: IntArray) -> FieldQuery:
+    return FieldQuery(
+        obstacle=obstacle,
+        link=answer.link,
+        d=answer.d,
+        dq=answer.dq,
+        dt=answer.dt,
+        valid=answer.valid,
+        contact_q=np.full(answer.dq.shape, np.nan),
+        unit="m",
+    )
