@@ -34,6 +34,7 @@ class Controller:
 
     def step(self, state: State, scene: Scene) -> Decision:
         """What to command now. Raises :class:`cdfctl.errors.InputError` where ``state`` or ``scene`` is not finite."""
+        as_vector(state.q, self.core.robot.n, "q")
         return self.core.step(state.q, scene, self._nominal(state, scene))
 
     def reset(self) -> None:

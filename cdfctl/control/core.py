@@ -14,7 +14,7 @@ from cdfctl.errors import InputError
 from cdfctl.fields.field import Field, make_field
 from cdfctl.robots.robot import Robot
 from cdfctl.scenario.variants import Variant
-from cdfctl.types import Array, Decision, FieldQuery, Rows, Scene, as_vector
+from cdfctl.types import Array, Decision, FieldQuery, Rows, Scene
 
 
 @dataclass(frozen=True)
@@ -63,12 +63,12 @@ class Core:
     def step(self, q: Array, scene: Scene, u_ref: Array) -> Decision:
         """The command at configuration ``q`` (n,) in ``scene``, as near as can be to ``u_ref`` (n,), rad/s.
 
+        ``q`` and ``u_ref`` are finite: the caller, who knows what they are called, has checked.
+
         Raises:
-            InputError: a wrong length, or a number that is not finite, in ``q``, ``scene`` or ``u_ref``.
+            InputError: a pose or velocity of ``scene`` is not finite.
         """
         robot, p = self.robot, self.parameters
-        q = as_vector(q, robot.n, "q")
-        u_ref = as_vector(u_ref, robot.n, "the velocity asked for")
         _check_scene(scene)
         answers = [source.ask(q, scene) for source in self._sources]
         rows = stack([source.rows(a) for source, a in zip(self._sources, answers, strict=True)], robot.n)

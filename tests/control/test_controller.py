@@ -148,6 +148,13 @@ def test_bad_input_never_reaches_the_solver(arm: Robot, q: list[float], u: list[
         SafetyFilter(arm, variant="sdf-tvcbf-qp").step(q, Scene(), u)
 
 
+def test_controller_refuses_a_state_that_is_not_finite(arm: Robot) -> None:
+    controller = build(arm, ControllerConfig(), JointGoalTask(type="joint-goal", goal=(1.0,)), 0.1)
+    for q in ([math.nan], [0.0, 0.0]):
+        with pytest.raises(InputError, match="q must"):
+            controller.step(State(0.0, np.array(q)), Scene())
+
+
 def test_scene_that_is_not_finite_is_refused_by_name(arm: Robot) -> None:
     scene = Scene([Obstacle(Sphere(0.1), [0, 0, 0], name="a"), Obstacle(Sphere(0.1), [1, 0, 0], name="b")])
     scene.twists[1, 4] = math.nan
