@@ -49,7 +49,8 @@ def robot_complaints(config: RobotConfig, error: InputError) -> list[Complaint]:
     named: list[Place] = [("robot", "lock", name) for name in config.lock]
     named += [("robot", "limits", "position", name) for name in config.limits.position]
     named += [("robot", "limits", "velocity", name) for name in (velocity if isinstance(velocity, dict) else ())]
-    fallback: list[Complaint] = [(error.message, error.hint, ("robot",))]
+    at = "tip" if config.tip is not None and f"'{config.tip}'" in error.message else "name" if config.name else "urdf"
+    fallback: list[Complaint] = [(error.message, error.hint, ("robot", at))]
     if not named:
         return fallback
     try:
