@@ -21,7 +21,7 @@ import numpy as np
 from cdfctl.robots.robot import Robot
 from cdfctl.simulation.clearance import Clearance
 from cdfctl.simulation.speed_bounds import speed_bounds
-from cdfctl.types import Array, Contact, IntArray, Outcome, Shape, Trajectory, Verdict
+from cdfctl.types import Array, Contact, Outcome, Shape, Trajectory, Verdict
 
 CONTACT = 1e-6  # m: contact is d <= CONTACT
 CLEARANCE_TOLERANCE = 1e-4  # m: accuracy of the least clearance
@@ -131,14 +131,19 @@ class Sweep:
                 obstacle[k, i] = self.motion.max_speed(i, t0, t1) + turning * reach
         return (robot[:, :, None] + obstacle[:, None, :]).reshape(len(self.t) - 1, self.at_steps.shape[1])
 
-    def _place(self, k: int, t: float) -> None:
-        """Move everything to time ``t`` within step ``k``."""
-        t0, t1 = self.t[k], self.t[k + 1]
-        self.clearance.place(self.q[k] + (self.q[k + 1] - self.q[k]) * ((t - t0) / (t1 - t0)), self.motion.poses(t))
+    def _bounds(self, k: int) -> Array:
+        """Lower bounds (pairs,) of the distances within step ``k``."""
+        bounds: Array = 0.5 * (self.at_steps[k] + self.at_steps[k + 1] - self.speed[k] * (self.t[k + 1] - self.t[k]))
+        return bounds
 
-    def _bounds(self, k: int, length: float, before: Array, after: Array, pairs: IntArray | slice) -> Array:
-        """Lower bounds of the distances of ``pairs`` on an interval of step ``k`` from those at its two ends."""
-        return 0.5 * (before + after - self.speed[k, pairs] * length)
+    def _measure(self, k: int, pair: int, t: float) -> float:
+        """Distance of a pair at time ``t`` within step ``k``; the least one is kept."""
+        t0, t1 = self.t[k], self.t[k + 1]
+        q = self.q[k] + (self.q[k + 1] - self.q[k]) * ((t - t0) / (t1 - t0))
+        self.clearance.place(q, self.motion.poses(t))
+        d = self.clearance.distance(pair)
+        self._note(d, t, pair)
+        return d
 
     def _note(self, distance: float, t: float, pair: int) -> None:
         if distance < self.best:
@@ -146,36 +151,30 @@ class Sweep:
 
     def find_least(self) -> None:
         """Search between the control steps until ``best`` is within ``CLEARANCE_TOLERANCE`` of the run's least."""
-        count = itertools.count()
-        heap: list[tuple[float, int, int, float, float, IntArray, Array, Array]] = []
+        heap: list[tuple[float, int, int, float, float, float, float]] = []
 
-        def push(k: int, a: float, b: float, pairs: IntArray, before: Array, after: Array) -> None:
-            bounds = self._bounds(k, b - a, before, after, pairs)
-            open_ = bounds < self.best - CLEARANCE_TOLERANCE
-            if np.any(open_):
-                item = (float(bounds.min()), next(count), k, a, b, pairs[open_], before[open_], after[open_])
-                heapq.heappush(heap, item)
+        def push(k: int, pair: int, a: float, b: float, d_a: float, d_b: float, speed: float) -> None:
+            bound = 0.5 * (d_a + d_b - speed * (b - a))
+            if bound < self.best - CLEARANCE_TOLERANCE:
+                heapq.heappush(heap, (bound, k, pair, a, b, d_a, d_b))
 
-        everything = np.arange(self.at_steps.shape[1], dtype=np.int64)
-        for k in range(len(self.t) - 1 if everything.size else 0):
-            push(k, float(self.t[k]), float(self.t[k + 1]), everything, self.at_steps[k], self.at_steps[k + 1])
+        for k in range(len(self.t) - 1):
+            for pair in np.flatnonzero(self._bounds(k) < self.best - CLEARANCE_TOLERANCE).tolist():
+                before, after = float(self.at_steps[k, pair]), float(self.at_steps[k + 1, pair])
+                push(k, pair, float(self.t[k]), float(self.t[k + 1]), before, after, float(self.speed[k, pair]))
         while heap and heap[0][0] < self.best - CLEARANCE_TOLERANCE:
-            _, _, k, a, b, pairs, before, after = heapq.heappop(heap)
-            middle = 0.5 * (a + b)
-            self._place(k, middle)
-            here = np.array([self.clearance.distance(int(pair)) for pair in pairs])
-            nearest = int(np.argmin(here))
-            self._note(float(here[nearest]), middle, int(pairs[nearest]))
-            push(k, a, middle, pairs, before, here)
-            push(k, middle, b, pairs, here, after)
+            _, k, pair, a, b, d_a, d_b = heapq.heappop(heap)
+            middle, speed = 0.5 * (a + b), float(self.speed[k, pair])
+            d = self._measure(k, pair, middle)
+            push(k, pair, a, middle, d_a, d, speed)
+            push(k, pair, middle, b, d, d_b, speed)
 
     def first_contact(self) -> Contact | None:
         """The first contact of the run: every pair advances by steps of ``d / L``, one control step after the other."""
         for k in range(len(self.t) - 1):
             start, end = float(self.t[k]), float(self.t[k + 1])
-            bounds = self._bounds(k, end - start, self.at_steps[k], self.at_steps[k + 1], slice(None))
             found: tuple[float, int] | None = None
-            for pair in np.flatnonzero(bounds <= CONTACT).tolist():
+            for pair in np.flatnonzero(self._bounds(k) <= CONTACT).tolist():
                 time = self._advance(k, pair, start, end if found is None else found[0])
                 if time is not None:
                     found = (time, pair)
@@ -188,9 +187,7 @@ class Sweep:
         """The first contact of a pair in [start, end), None where there is none."""
         t = start
         while t < end:
-            self._place(k, t)
-            d = self.clearance.distance(pair)
-            self._note(d, t, pair)
+            d = self._measure(k, pair, t)
             if d <= CONTACT:
                 return t
             # at least CONTACT / L, within which a distance above CONTACT cannot fall below zero
