@@ -16,11 +16,11 @@ robot:
   q0: [0.5, 0.5]
 task:
   type: joint-goal
-  goal: [0.7, 0.4]
+  goal: [2.5, 0.4]
 obstacles:
   - name: disc
     shape: {type: ball, radius: 0.3}
-    position: [-3.0, {uniform: [2.0, 3.0]}, 0.0]
+    position: [-3.0, {uniform: [-3.0, -2.0]}, 0.0]
     velocity: [0.1, 0.0, 0.0]
 controller: {variant: sdf-tvcbf-qp, gain: 9.9}
 simulation: {dt: 0.1, time_limit: 5.0, tolerance: 0.1}

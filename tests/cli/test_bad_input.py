@@ -15,8 +15,8 @@ def variant(old: str, new: str) -> str:
     return PLANAR.replace(old, new, 1)
 
 
-START, GOAL, RADIUS = "q0: [0.5, 0.5]", "goal: [0.7, 0.4]", "radius: 0.3"
-PLACE = "position: [-3.0, {uniform: [2.0, 3.0]}, 0.0]"
+START, GOAL, RADIUS = "q0: [0.5, 0.5]", "goal: [2.5, 0.4]", "radius: 0.3"
+PLACE = "position: [-3.0, {uniform: [-3.0, -2.0]}, 0.0]"
 BOMB = "a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
     f"{b}: &{b} [{', '.join([f'*{a}'] * 10)}]\n" for a, b in zip("abcdefgh", "bcdefghi", strict=True)
 )
@@ -34,7 +34,7 @@ FILES = {
     "negative step": (variant("dt: 0.1", "dt: -0.1"), "simulation.dt"),
     "unknown key": (variant("velocity:", "velocty:"), "did you mean velocity?"),
     "duplicate key": (PLANAR + "name: again\n", "duplicate key 'name'"),
-    "missing key": (variant("task:\n  type: joint-goal\n  goal: [0.7, 0.4]\n", ""), "task"),
+    "missing key": (variant("task:\n  type: joint-goal\n  goal: [2.5, 0.4]\n", ""), "task"),
     "unknown robot": (variant("name: planar", "name: plannar"), "planar"),
     "unknown controller": (variant("sdf-tvcbf-qp", "sdf-tvcbf-pq"), "sdf-tvcbf-qp"),
     "unknown solver": (variant("gain: 9.9", "gain: 9.9, solver: dapq"), "daqp"),
