@@ -103,11 +103,13 @@ class ConvexMesh:
     vertices: Array = field(repr=False)
 
     def __init__(self, vertices: ArrayLike | str | Path) -> None:
-        points: ArrayLike = vertices
+        points: ArrayLike
         if isinstance(vertices, (str, Path)):
             from cdfctl.robots.meshes import load_vertices
 
             points = load_vertices(Path(vertices))
+        else:
+            points = vertices
         object.__setattr__(self, "vertices", _points(points, "mesh vertices", least=4))
 
 
