@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from cdfctl.errors import InputError
@@ -34,14 +36,10 @@ def show(item: RenderableType) -> None:
     Raises:
         InputError: standard output cannot be written (a full disk, for example).
     """
-    try:
-        console = stdout()
+    console = stdout()
+    with _writing():
         console.print(item)
         console.file.flush()
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        raise InputError(f"cannot write to standard output: {error.strerror}") from None
 
 
 def write(text: str) -> None:
@@ -50,13 +48,26 @@ def write(text: str) -> None:
     Raises:
         InputError: standard output cannot be written.
     """
-    try:
+    with _writing():
         sys.stdout.write(text + "\n")
         sys.stdout.flush()
+
+
+@contextmanager
+def _writing() -> Iterator[None]:
+    try:
+        yield
     except BrokenPipeError:
+        abandon_stdout()
         raise
     except OSError as error:
+        abandon_stdout()
         raise InputError(f"cannot write to standard output: {error.strerror}") from None
+
+
+def abandon_stdout() -> None:
+    """Send what is still buffered nowhere: else the interpreter tries again as it ends, and complains."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def write_json(document: Mapping[str, Any] | Sequence[Any]) -> None:

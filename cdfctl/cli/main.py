@@ -5,7 +5,6 @@ Heavy imports wait until a command needs them: ``cdfctl --help`` imports neither
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Sequence
 from typing import Annotated
@@ -14,6 +13,7 @@ import typer
 
 from cdfctl import __version__
 from cdfctl.cli import check, doctor, options, robots, run, scenarios, schema
+from cdfctl.cli.console import abandon_stdout
 from cdfctl.cli.failures import report_bug, report_failure, report_usage
 from cdfctl.errors import CdfctlError
 
@@ -75,8 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("cdfctl: interrupted", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
-        # The reader has gone (`cdfctl schema | head`): say nothing, and let the interpreter flush into nowhere.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        abandon_stdout()  # the reader has gone (`cdfctl schema | head`): say nothing
         return CdfctlError.exit_status
     except Exception as error:  # the one place: whatever else escapes is a bug, and a bug is one line and a log
         return report_bug(error, words, debug=debug)

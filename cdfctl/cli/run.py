@@ -68,7 +68,7 @@ def follow(wired: Trial, *, quiet: bool) -> bool:
         columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[clock]}"))
         with Progress(*columns, console=stderr(), transient=True) as progress:
             # The first step of a first run waits for the compiler.
-            bar = progress.add_task("preparing", total=wired.rollout.max_steps, clock="")
+            bar = progress.add_task("preparing (a first run compiles)", total=wired.rollout.max_steps, clock="")
             for step in steps:
                 clock = f"{step.state.t:.1f} of at most {wired.scenario.simulation.time_limit:g} s"
                 progress.update(bar, description=wired.scenario.name, completed=step.index + 1, clock=clock)

@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from cdfctl.cli.console import finite
-from cdfctl.report import stack
+from cdfctl.report import speed, stack
 from cdfctl.scenario.library import scenarios_dir
 
 ROBOTS = {"planar", "franka", "ur5", "ur10", "xarm7", "kinova", "z1"}
@@ -90,3 +90,15 @@ def test_numbers_that_are_not_finite_become_null():
         "b": {"c": None, "d": "x"},
         "e": True,
     }
+
+
+def test_doctor_times_the_control_step(cli, monkeypatch):
+    monkeypatch.setattr(speed, "STEPS", 3)
+    monkeypatch.setattr(speed, "WARM_UP", 1)
+    document = cli("doctor", "--speed", "--json").document()
+    assert [(timing["robot"], timing["obstacles"]) for timing in document["speed"]] == [("franka", 6), ("franka", 50)]
+    assert all(0.0 < timing["step_ms"]["p50"] <= timing["step_ms"]["p99"] for timing in document["speed"])
+    shown = cli("doctor", "--speed")
+    assert shown.status == 0
+    assert "sdf-tvcbf-qp  " in shown.out
+    assert " ms" in shown.out
