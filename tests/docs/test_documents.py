@@ -7,6 +7,7 @@ behind it says what it ends in, 0 where nothing is said. ``python`` blocks of a 
 
 from __future__ import annotations
 
+import pkgutil
 import re
 import shlex
 from pathlib import Path
@@ -78,6 +79,13 @@ def test_no_shell_block_escapes_these_tests():
 def test_the_pages_have_commands_and_python():
     assert sum(len(commands(page)) for page in PAGES) >= 8
     assert any(blocks(page, "python") for page in PAGES)
+
+
+def test_every_name_of_the_code_in_the_pages_is_there():
+    names = {name for page in PAGES for name in re.findall(r"`(cdfctl(?:\.\w+)+)`", page.read_text(encoding="utf-8"))}
+    assert "cdfctl.control.rows.tvcbf_rows" in names
+    for name in names:
+        pkgutil.resolve_name(name)
 
 
 def test_the_readme_s_two_commands_are_targets_of_the_makefile():
