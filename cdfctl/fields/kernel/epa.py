@@ -22,11 +22,11 @@ from cdfctl.fields.kernel.sets import ConvexSets
 from cdfctl.fields.kernel.vec import Rot, Vec, cross, dot, norm, perpendicular, scale, sub, vec
 from cdfctl.types import Array, IntArray
 
-MAX_POINTS = 400
+MAX_POINTS = 256
 MAX_FACES = 4 * MAX_POINTS
 FLAT = 1e-12  # D thinner than this, relative to its size, has no inside
-GAP = 1e-13  # of the bounds, relative to the size of D
-COPLANAR = 1e-10  # faces whose offsets differ by less, relative to that size, may carry the nearest point together
+GAP = 1e-11  # of the bounds, relative to the size of D
+COPLANAR = 1e-11  # a point nearer to a face's plane than this, relative to that size, lies in it
 
 
 class Polytope(NamedTuple):
@@ -73,8 +73,7 @@ def core_depth(sets_a: ConvexSets, i: int, sets_b: ConvexSets, j: int, r: Rot, t
     if flat:
         return CoreDepth(0.0, flat_normal, (0.0, 0.0, 0.0), True)
     points, faces = 4, 4
-    depth, nearest = np.inf, 0
-    normal = vec(polytope.normal, 0)
+    depth, normal = np.inf, flat_normal
     while True:
         nearest = _nearest_face(polytope, faces)
         n = vec(polytope.normal, nearest)
@@ -82,14 +81,23 @@ def core_depth(sets_a: ConvexSets, i: int, sets_b: ConvexSets, j: int, r: Rot, t
         height = dot(n, w)
         if height < depth:
             depth, normal = height, n
-        if not height - polytope.offset[nearest] > GAP * size or points == MAX_POINTS:
+        if not height - polytope.offset[nearest] > GAP * size:
             break
         _put_point(polytope, points, w, a)
-        grown = _grow(polytope, points, faces)
+        grown = _grow(polytope, points, faces, COPLANAR * size)
         if grown < 0:
             break
         points, faces = points + 1, grown
-    return CoreDepth(depth, normal, _witness(polytope, faces, nearest, COPLANAR * size), False)
+        if points == MAX_POINTS:
+            # As on the axis of a cylinder, where no direction is the nearest. The best of all faces is near enough.
+            for f in range(faces):
+                if polytope.offset[f] < depth:
+                    n = vec(polytope.normal, f)
+                    a, w = support_of_difference(sets_a, i, sets_b, j, r, t, n)
+                    if dot(n, w) < depth:
+                        depth, normal, nearest = dot(n, w), n, f
+            break
+    return CoreDepth(depth, normal, _witness(polytope, faces, nearest, 10.0 * COPLANAR * size), False)
 
 
 @njit
@@ -203,12 +211,16 @@ def _nearest_face(polytope: Polytope, faces: int) -> int:
 
 
 @njit
-def _grow(polytope: Polytope, point: int, faces: int) -> int:
-    """Take away the faces ``point`` sees and join it to their rim; the new number of faces, -1 if there is no room."""
+def _grow(polytope: Polytope, point: int, faces: int, coplanar: float) -> int:
+    """Take away the faces ``point`` sees and join it to their rim; the new number of faces, -1 if there is no room.
+
+    Faces in whose plane it lies go too. So every edge of the rim belongs to a face the point is truly below, is not in
+    line with the point, and the new faces have an area and a normal to trust.
+    """
     p = vec(polytope.w, point)
     rim, f = 0, 0
     while f < faces:
-        if dot(vec(polytope.normal, f), p) > polytope.offset[f]:
+        if dot(vec(polytope.normal, f), p) > polytope.offset[f] - coplanar:
             for k in range(3):
                 rim = _toggle(polytope.edge, rim, polytope.face[f, k], polytope.face[f, (k + 1) % 3])
             faces -= 1

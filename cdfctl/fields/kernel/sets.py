@@ -31,7 +31,7 @@ Records: TypeAlias = NDArray[Any]
 SCAN_LIMIT = 24  # sets with more vertices than this climb; a scan of 24 takes as long as a climb
 
 
-INFO = np.dtype(
+_INFO = np.dtype(
     [
         ("first", np.int64),  # the vertices of the set are first … last - 1
         ("last", np.int64),
@@ -46,6 +46,7 @@ INFO = np.dtype(
     ],
     align=True,
 )
+INFO = np.dtype((np.record, _INFO))
 """What is known of one set. A record, not an array for each: few arguments keep calls and their compilation short."""
 
 
