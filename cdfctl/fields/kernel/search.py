@@ -1,0 +1,270 @@
+"""The nearest contacts of the whole robot with one obstacle: successive halving over many starts.
+
+Every start gets two steps; the most promising go on with three more, and the best of those to convergence. A candidate
+is promising by its cost, an estimate of the distance from q to the contact it is heading for, and must differ from the
+ones kept before it. A converged candidate is a contact only if no other piece is in penetration there; where one is,
+that piece touches earlier, and the search goes on with it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cdfctl.fields.kernel.body import Body, forward, piece_pose
+from cdfctl.fields.kernel.contact import (
+    Candidates,
+    Scratch,
+    advance,
+    evaluate,
+    frames_of,
+    new_candidates,
+    new_scratch,
+    restore,
+)
+from cdfctl.fields.kernel.distance import Work, lower_bound, new_work, piece_distance, relative_pose
+from cdfctl.fields.kernel.jit import njit
+from cdfctl.fields.kernel.parts import Parts
+from cdfctl.fields.kernel.projection import copy
+from cdfctl.fields.kernel.starts import Starts, Table, new_starts, swing_starts, table_starts
+from cdfctl.fields.kernel.vec import ZERO, Vec
+from cdfctl.types import Array, BoolArray, IntArray
+
+SWINGS = 8  # one-joint turns kept as starts
+ENTRIES = 8  # table entries kept as starts
+COLD_KEPT = 12  # starts that are followed, beyond the contacts asked for, without a memory
+WARM_KEPT = 4  # and with one
+SECOND_KEPT = 4  # of these, those that go on after two steps
+SPARE = 1  # and those that are finished
+LAST_STEPS = 12
+CONVERGED = 5e-3  # rad: the residual at which a contact's distance is right to its square
+ALIKE = 0.05  # rad: candidates of one piece nearer than this are one
+DISTINCT = 0.1  # rad: contacts nearer than this to a nearer one are not told apart
+UNKNOWN, NOTHING = 0, -1  # in a memory: nothing is known of an obstacle; no contact was found
+TOUCH = 5e-5  # m: greatest |f| of a contact, and the penetration of other pieces that is overlooked
+
+
+class Search(NamedTuple):
+    """Workspace of the search, one a thread.
+
+    Attributes:
+        found: the candidates.
+        chosen: (c,) those that go on, best first.
+        dropped: (c,) marks.
+        swings, entries: starts of either kind.
+        scratch, work: of the steps and of the distances.
+    """
+
+    found: Candidates
+    chosen: IntArray
+    dropped: BoolArray
+    swings: Starts
+    entries: Starts
+    scratch: Scratch
+    work: Work
+
+
+class Memory(NamedTuple):
+    """Contacts remembered from the last query, obstacle by obstacle: starts of the next one.
+
+    Attributes:
+        known: (m,) how many; 0 where nothing is known yet, -1 where the last query found no contact.
+        piece: (m, w).
+        x: (m, w, n).
+    """
+
+    known: IntArray
+    piece: IntArray
+    x: Array
+
+
+def new_search(body: Body, remembered: int) -> Search:
+    """A workspace for ``body`` and memories of ``remembered`` contacts an obstacle."""
+    k, n = len(body.joint), len(body.chain.parent)
+    c = k + remembered + SWINGS + ENTRIES
+    return Search(
+        found=new_candidates(c, n),
+        chosen=np.zeros(c, dtype=np.int64),
+        dropped=np.zeros(c, dtype=np.bool_),
+        swings=new_starts(SWINGS, n),
+        entries=new_starts(ENTRIES, n),
+        scratch=new_scratch(n),
+        work=new_work(),
+    )
+
+
+def new_memory(m: int, w: int, n: int) -> Memory:
+    """An empty memory for m obstacles."""
+    return Memory(np.zeros(m, dtype=np.int64), np.zeros((m, w), dtype=np.int64), np.zeros((m, w, n)))
+
+
+@njit
+def add_start(
+    body: Body, q: Array, parts: Parts, o: int, found: Candidates, c: int, k: int, x: Array, work: Work
+) -> None:
+    """Candidate c begins with piece k at x, joints that do not move the piece as in q."""
+    joint = body.joint[k]
+    found.piece[c] = k
+    for j in range(q.shape[0]):
+        inside = min(max(x[j], body.chain.lower[j]), body.chain.upper[j])
+        found.x[c, j] = inside if body.chain.moves[j, joint] else q[j]
+    evaluate(body, q, parts, o, found, c, work)
+
+
+@njit
+def nearest_contacts(
+    body: Body,
+    q: Array,
+    parts: Parts,
+    o: int,
+    memory: Memory,
+    table: Table,
+    centre: Vec,
+    sheets: int,
+    search: Search,
+) -> int:
+    """The contacts with obstacle o nearest to q, which must be clear of it: nearest first in ``search.chosen``.
+
+    At most ``sheets`` of them, told apart by :data:`DISTINCT`; the answer says how many. The first candidates of
+    ``search.found`` must be the pieces, in their order, evaluated at q. ``memory`` is used and renewed.
+    """
+    found, chosen = search.found, search.chosen
+    count = body.joint.shape[0]
+    frames = frames_of(found, 0)
+    warm, cold = max(0, memory.known[o]), memory.known[o] == UNKNOWN
+    for i in range(warm):
+        add_start(body, q, parts, o, found, count, memory.piece[o, i], memory.x[o, i], search.work)
+        count += 1
+    if cold:
+        forward(body, q, frames)
+        for i in range(swing_starts(body, q, frames, centre, search.swings)):
+            add_start(body, q, parts, o, found, count, search.swings.piece[i], search.swings.x[i], search.work)
+            count += 1
+    for i in range(table_starts(body, q, table, centre, search.entries)):
+        add_start(body, q, parts, o, found, count, search.entries.piece[i], search.entries.x[i], search.work)
+        count += 1
+
+    kept = choose(search, count, (COLD_KEPT if cold else WARM_KEPT) + sheets, ALIKE, True)
+    for i in range(kept):
+        _improve(body, q, parts, o, search, chosen[i], 2)
+    _drop_others(search, count, kept)
+    kept = choose(search, count, SECOND_KEPT + sheets, ALIKE, True)
+    for i in range(kept):
+        _improve(body, q, parts, o, search, chosen[i], 3)
+    _drop_others(search, count, kept)
+    kept = choose(search, count, sheets + SPARE, ALIKE, True)
+    for i in range(kept):
+        _finish(body, q, parts, o, search, chosen[i])
+    _drop_others(search, count, kept)
+    kept = choose(search, count, sheets + SPARE, ALIKE, True)
+    if cold and kept == 0:
+        for k in range(body.joint.shape[0]):
+            add_start(body, q, parts, o, found, k, k, q, search.work)
+            _finish(body, q, parts, o, search, k)
+        kept = choose(search, count, sheets + SPARE, ALIKE, True)
+    _remember(memory, o, search, kept)
+    _drop_others(search, count, kept)
+    return choose(search, count, sheets, DISTINCT, False)
+
+
+@njit
+def choose(search: Search, count: int, most: int, gap: float, by_piece: bool) -> int:
+    """Up to ``most`` candidates of least cost into ``search.chosen``; how many.
+
+    One nearer than ``gap`` to a better one (of the same piece, if ``by_piece``) is passed over.
+    """
+    found, chosen, dropped = search.found, search.chosen, search.dropped
+    kept = 0
+    while kept < most:
+        best = -1
+        for c in range(count):
+            if not dropped[c] and found.cost[c] < np.inf and (best < 0 or found.cost[c] < found.cost[best]):
+                best = c
+        if best < 0:
+            break
+        dropped[best] = True
+        alike = False
+        for i in range(kept):
+            other = chosen[i]
+            if by_piece and found.piece[other] != found.piece[best]:
+                continue
+            distance2 = 0.0
+            for j in range(found.x.shape[1]):
+                distance2 += (found.x[other, j] - found.x[best, j]) ** 2
+            alike = alike or distance2 < gap * gap
+        if not alike:
+            chosen[kept] = best
+            kept += 1
+    for c in range(count):
+        dropped[c] = False
+    return kept
+
+
+@njit
+def _drop_others(search: Search, count: int, kept: int) -> None:
+    """Only the first ``kept`` of ``search.chosen`` stay candidates: the others get an infinite cost."""
+    for i in range(kept):
+        search.dropped[search.chosen[i]] = True
+    for c in range(count):
+        if not search.dropped[c]:
+            search.found.cost[c] = np.inf
+        search.dropped[c] = False
+
+
+@njit
+def _improve(body: Body, q: Array, parts: Parts, o: int, search: Search, c: int, steps: int) -> None:
+    """Up to ``steps`` steps of candidate c, until it has converged."""
+    found = search.found
+    for _ in range(steps):
+        if found.residual[c] < CONVERGED and abs(found.f[c]) < TOUCH:
+            return
+        advance(body, q, parts, o, found, c, search.scratch, search.work)
+
+
+@njit
+def _finish(body: Body, q: Array, parts: Parts, o: int, search: Search, c: int) -> None:
+    """Candidate c to convergence; its cost becomes its distance from q, infinite where it is no contact."""
+    found = search.found
+    for _ in range(2):
+        _improve(body, q, parts, o, search, c, LAST_STEPS)
+        restore(body, q, parts, o, found, c, search.scratch, search.work)
+        if not abs(found.f[c]) <= TOUCH:
+            found.cost[c] = np.inf
+            return
+        other = penetrating_piece(body, parts, o, found, c, search.work)
+        if other < 0:
+            return
+        found.piece[c] = other
+        for j in range(q.shape[0]):
+            if not body.chain.moves[j, body.joint[other]]:
+                found.x[c, j] = q[j]
+        evaluate(body, q, parts, o, found, c, search.work)
+    found.cost[c] = np.inf
+
+
+@njit
+def penetrating_piece(body: Body, parts: Parts, o: int, found: Candidates, c: int, work: Work) -> int:
+    """A piece other than that of candidate c that is in penetration at its x, -1 for none."""
+    frames = frames_of(found, c)
+    forward(body, found.x[c], frames)
+    for k in range(body.joint.shape[0]):
+        if k == found.piece[c]:
+            continue
+        r_a, t_a = piece_pose(body, frames, k)
+        for p in range(parts.first[o], parts.first[o + 1]):
+            r, t = relative_pose(r_a, t_a, parts, p)
+            if lower_bound(body, k, parts, p, r, t) >= -TOUCH:
+                continue
+            if piece_distance(body, frames, k, parts, p, ZERO, 0.0, work).d < -TOUCH:
+                return k
+    return -1
+
+
+@njit
+def _remember(memory: Memory, o: int, search: Search, kept: int) -> None:
+    count = min(kept, memory.piece.shape[1])
+    memory.known[o] = count if count > 0 else NOTHING
+    for i in range(count):
+        memory.piece[o, i] = search.found.piece[search.chosen[i]]
+        copy(search.found.x[search.chosen[i]], memory.x[o, i])
