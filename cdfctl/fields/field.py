@@ -53,8 +53,14 @@ def _sdf(robot: Robot) -> Field:
     return SDF(robot)
 
 
+def _cdf(robot: Robot) -> Field:
+    from cdfctl.fields.cdf import CDF
+
+    return CDF(robot)
+
+
 # A new field is one line here. Values import their module when called: the compiled kernels take a while to load.
-FIELDS: dict[str, Callable[[Robot], Field]] = {"sdf": _sdf}
+FIELDS: dict[str, Callable[[Robot], Field]] = {"sdf": _sdf, "cdf": _cdf}
 
 
 def make_field(name: str, robot: Robot) -> Field:
