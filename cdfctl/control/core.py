@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,8 +13,12 @@ from cdfctl.control.rows import cbf_rows, hyperplane_rows, joint_limit_box, stac
 from cdfctl.errors import InputError
 from cdfctl.fields.field import Field, make_field
 from cdfctl.robots.robot import Robot
-from cdfctl.scenario.variants import Variant
+from cdfctl.scenario.variants import FieldKind, Variant
 from cdfctl.types import Array, Decision, FieldQuery, Rows, Scene
+
+
+# The fields a variant asks, the one whose barrier is reported as h first.
+FIELDS_OF: Mapping[FieldKind, tuple[str, ...]] = {"sdf": ("sdf",), "cdf": ("cdf",), "dual": ("cdf", "sdf")}
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,9 @@ class Core:
             if isinstance(weight, tuple) and len(weight) != n:
                 raise InputError(f"{name} must be one number or {n}, one a joint, found {len(weight)}")
         self.robot, self.variant, self.parameters, self.dt = robot, variant, parameters, dt
-        self._sources: Sequence[RowSource] = (_source(variant.field, robot, variant, parameters, dt),)
+        self._sources: Sequence[RowSource] = [
+            _source(name, robot, variant, parameters, dt) for name in FIELDS_OF[variant.field]
+        ]
         self._qp = StepQP(
             n,
             effort_weight=parameters.effort_weight,
@@ -60,10 +66,11 @@ class Core:
         for source in self._sources:
             source.field.reset()
 
-    def step(self, q: Array, scene: Scene, u_ref: Array) -> Decision:
+    def step(self, q: Array, scene: Scene, u_ref: Array, task: Rows | None = None) -> Decision:
         """The command at configuration ``q`` (n,) in ``scene``, as near as can be to ``u_ref`` (n,), rad/s.
 
-        ``q`` and ``u_ref`` are finite: the caller, who knows what they are called, has checked.
+        ``q`` and ``u_ref`` are finite: the caller, who knows what they are called, has checked. ``task`` are rows the
+        task adds.
 
         Raises:
             InputError: a pose or velocity of ``scene`` is not finite.
@@ -71,7 +78,8 @@ class Core:
         robot, p = self.robot, self.parameters
         _check_scene(scene)
         answers = [source.ask(q, scene) for source in self._sources]
-        rows = stack([source.rows(a) for source, a in zip(self._sources, answers, strict=True)], robot.n)
+        parts = [source.rows(a) for source, a in zip(self._sources, answers, strict=True)]
+        rows = stack(parts if task is None else [*parts, task], robot.n)
         low, high = joint_limit_box(q, robot.lower, robot.upper, robot.velocity_limit, p.limit_alpha)
         command = self._qp.solve(u_ref, self._u_last, rows, low, high)
         self._u_last = command.u
@@ -83,6 +91,7 @@ class Core:
             status=command.status,
             infeasible=command.infeasible,
             residual=command.residual,
+            h_sdf=least_barrier(answers[1], len(scene), p.margin) if len(answers) > 1 else None,
             contact_q=nearest_contact(first, len(scene)) if first.unit == "rad" else None,
         )
 

@@ -7,6 +7,9 @@ Equations, with h = d - margin, u the joint velocity and all derivatives as in t
 
 - ``tvcbf``: dh/dq . u + dh/dt >= -alpha h
 - ``cbf``: dh/dq . u >= -alpha h (the same without the time term)
+- ``hyperplane``: -dd/dq . u Dt <= ln(d + b), the separating hyperplane; it takes d itself, not h
+- task ``tvclf``: dV+/dq . u <= -gamma V - (V+ - V)/Dt + delta, delta >= 0, with V the distance to the target where it
+  is and V+ where it will be one step on; the reference velocity is zero
 """
 
 from __future__ import annotations
@@ -81,6 +84,37 @@ VARIANTS: Mapping[str, Variant] = MappingProxyType(
         variant.name: variant
         for variant in (
             Variant(
+                name="dual-tvcbf-qp",
+                field="dual",
+                safety="tvcbf",
+                task="joint-goal",
+                equation="dh/dq . u + dh/dt >= -alpha h,  both for h = d_c - margin and for h = d_s - margin",
+                source="ours: rows in configuration space, and signed-distance rows where those can jump",
+                defaults=MappingProxyType(
+                    {
+                        "alpha": Default(3.0, "ours"),
+                        "sheets": Default(4, "ours: with the nearest contact alone the next one gets crossed"),
+                        "links": Default("all", "ours: one signed-distance row a link"),
+                    }
+                ),
+            ),
+            Variant(
+                name="cdf-tvcbf-qp",
+                field="cdf",
+                safety="tvcbf",
+                task="joint-goal",
+                equation="dh/dq . u + dh/dt >= -alpha h,  h = d_c - margin",
+                source="paper, time-varying CBF with the configuration-space distance field",
+            ),
+            Variant(
+                name="cdf-cbf-qp",
+                field="cdf",
+                safety="cbf",
+                task="joint-goal",
+                equation="dh/dq . u >= -alpha h,  h = d_c - margin",
+                source="ours: the ablation of the time term",
+            ),
+            Variant(
                 name="sdf-tvcbf-qp",
                 field="sdf",
                 safety="tvcbf",
@@ -95,6 +129,22 @@ VARIANTS: Mapping[str, Variant] = MappingProxyType(
                 task="joint-goal",
                 equation="dh/dq . u >= -alpha h,  h = d_s - margin",
                 source="paper, baseline: blind to the obstacle's velocity",
+            ),
+            Variant(
+                name="sdf-sh-qp",
+                field="sdf",
+                safety="hyperplane",
+                task="joint-goal",
+                equation="-dd/dq . u Dt <= ln(d + b),  d = d_s",
+                source="paper, baseline: separating hyperplanes of its predecessor",
+            ),
+            Variant(
+                name="sdf-tvcbf-tvclf-qp",
+                field="sdf",
+                safety="tvcbf",
+                task="tvclf",
+                equation="as sdf-tvcbf-qp, and dV+/dq . u <= -gamma V - (V+ - V)/Dt + delta,  V = d_s of the target",
+                source="paper, whole-body reaching, with the signed distance field: singular where the CDF is not",
             ),
         )
     }
