@@ -27,9 +27,10 @@ Quiet: TypeAlias = Annotated[
 NamesOnly: TypeAlias = Annotated[bool, typer.Option("--quiet", "-q", help="Only the names, one a line.")]
 Debug: TypeAlias = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
 Seed: TypeAlias = Annotated[
-    int | None, typer.Option("--seed", min=0, help="Seed of the draws. [default: the scenario's]", show_default=False)
+    int | None,
+    typer.Option("--seed", metavar="N", min=0, help="Seed of the draws. [default: the scenario's]", show_default=False),
 ]
-Trial: TypeAlias = Annotated[int, typer.Option("--trial", min=0, help="Which draw of the seed.")]
+Trial: TypeAlias = Annotated[int, typer.Option("--trial", metavar="N", min=0, help="Which draw of the seed.")]
 Controller: TypeAlias = Annotated[
     str | None,
     typer.Option("--controller", metavar="NAME", help="Controller. [default: the scenario's]", show_default=False),

@@ -42,6 +42,9 @@ def run(
     check_target(folder)
     finished = follow(wired, quiet=quiet)
     result = wired.result()
+    if not finished and not len(result.trajectory.u):
+        note("cdfctl: interrupted before the first step; nothing was written")
+        return INTERRUPTED
     document = write_run(folder, result)
     if json:
         write_json(document)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import pty
 import re
 import signal
 import subprocess
 import sys
-import time
 from contextlib import suppress
 from pathlib import Path
 
@@ -19,6 +17,7 @@ import pytest
 
 from cdfctl.errors import PlantError
 from cdfctl.simulation.plant import KinematicPlant
+from cdfctl.simulation.rollout import Rollout
 
 KEYS = {
     "scenario": str,
@@ -121,39 +120,35 @@ def test_a_plant_that_fails_is_4_and_the_partial_run_is_kept(cli, small: Path, m
     assert len(arrays(small.parent / result.document()["run_dir"])["t"]) == 2
 
 
-def test_an_interrupt_keeps_what_was_done(process, small: Path):
-    """In a process of its own, as a user's Ctrl-C."""
-    slow = ["--set", "simulation.dt=0.0001", "--set", "simulation.time_limit=60.0", "--set", "controller.gain=0.0001"]
-    child = subprocess.Popen(
-        [sys.executable, "-m", "cdfctl", "run", small.name, *slow, "--json"],
-        cwd=small.parent,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    time.sleep(0.1)
-    deadline = time.monotonic() + 120
-    # The kernels are compiled and the loop runs once the process has used some seconds of the processor.
-    while time.monotonic() < deadline and _processor_seconds(child.pid) < 8:
-        time.sleep(0.1)
-    child.send_signal(signal.SIGINT)
-    out, err = child.communicate(timeout=120)
-    assert child.returncode == 130
-    assert "Traceback" not in err
-    assert "interrupted" in err
-    if out:
-        document = json.loads(out)
-        assert document["success"] is False
-        assert (small.parent / document["run_dir"] / "trajectory.npz").exists()
+def test_an_interrupt_before_the_first_step_leaves_an_older_run_alone(cli, small: Path, monkeypatch):
+    def interrupted(self):
+        raise KeyboardInterrupt
+        yield
+
+    assert cli("run", small.name, "--quiet").status == 0
+    monkeypatch.setattr(Rollout, "steps", interrupted)
+    result = cli("run", small.name, "--json")
+    assert (result.status, result.out) == (130, "")
+    assert "nothing was written" in result.err
+    folder = small.parent / "runs" / "small-sdf-tvcbf-qp-0-0"
+    assert json.loads((folder / "result.json").read_text())["outcome"] == "reached"
 
 
-def _processor_seconds(pid: int) -> float:
-    try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    except FileNotFoundError:
-        return math.inf
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+def test_an_interrupt_after_some_steps_keeps_them(cli, small: Path, monkeypatch):
+    steps = Rollout.steps
+
+    def interrupted(self):
+        for step in steps(self):
+            yield step
+            if step.index == 2:
+                raise KeyboardInterrupt
+
+    monkeypatch.setattr(Rollout, "steps", interrupted)
+    result = cli("run", small.name, "--json")
+    assert result.status == 130
+    assert "interrupted after 3 steps" in result.err
+    assert result.document()["steps"] == 3
+    assert len(arrays(small.parent / result.document()["run_dir"])["u"]) == 3
 
 
 def test_the_draw_depends_on_seed_and_trial_alone(cli, small: Path):
@@ -198,8 +193,13 @@ def test_every_shipped_scenario_that_can_run_is_valid(cli, here: Path, scenario)
     assert cli("check", scenario).status == 0
 
 
-def on_terminal(arguments: list[str], folder: Path, stream: str, **environment: str) -> tuple[int, bytes, bytes]:
-    """Status of ``cdfctl``, what the terminal behind ``stream`` showed, and what the other stream got."""
+def on_terminal(
+    arguments: list[str], folder: Path, stream: str, interrupt_at: bytes | None = None, **environment: str
+) -> tuple[int, bytes, bytes]:
+    """Status of ``cdfctl``, what the terminal behind ``stream`` showed, and what the other stream got.
+
+    Where the terminal has shown ``interrupt_at``, the process is interrupted, as by Ctrl-C.
+    """
     leader, follower = pty.openpty()
     other = "stderr" if stream == "stdout" else "stdout"
     with subprocess.Popen(
@@ -215,9 +215,25 @@ def on_terminal(arguments: list[str], folder: Path, stream: str, **environment: 
         with suppress(OSError):
             while part := os.read(leader, 65536):
                 shown += part
+                if interrupt_at is not None and interrupt_at in shown:
+                    child.send_signal(signal.SIGINT)
+                    interrupt_at = None
         os.close(leader)
         rest = getattr(child, other).read()
     return child.returncode, shown, rest
+
+
+def test_ctrl_c_keeps_the_steps_and_is_130_without_a_traceback(small: Path):
+    slow = ["--set", "simulation.dt=0.0001", "--set", "simulation.time_limit=60.0", "--set", "controller.gain=0.0001"]
+    status, shown, out = on_terminal(
+        ["run", small.name, *slow, "--json"], small.parent, "stderr", interrupt_at=b"of at most"
+    )
+    assert status == 130
+    assert b"Traceback" not in shown
+    assert b"interrupted after" in shown
+    document = json.loads(out)
+    assert document["steps"] > 0
+    assert document["success"] is False
 
 
 @pytest.mark.parametrize("quiet", [False, True])
