@@ -37,4 +37,4 @@ def check(
         count = len(wired.scenario.obstacles)
         obstacles = "1 obstacle" if count == 1 else f"{count} obstacles"
         robot = f"{wired.robot.name} ({wired.robot.n} joints)"
-        write(f"{file.shown}: valid: {robot}, {obstacles}, {wired.scenario.controller.variant}")
+        write(f"{scenario}: valid: {robot}, {obstacles}, {wired.scenario.controller.variant}")
