@@ -114,8 +114,13 @@ def piece_distance(
     """
     r_a, t_a = piece_pose(body, frames, k)
     r, t = relative_pose(r_a, t_a, parts, p)
-    c = signed_distance(body.sets, k, parts.sets, p, r, t, rotate_back(r_a, guess), cutoff, work)
-    return Contact(c.d, add(t_a, rotate(r_a, c.a)), add(t_a, rotate(r_a, c.b)), rotate(r_a, c.normal))
+    return to_world(r_a, t_a, signed_distance(body.sets, k, parts.sets, p, r, t, rotate_back(r_a, guess), cutoff, work))
+
+
+@njit
+def to_world(r: Rot, t: Vec, c: Contact) -> Contact:
+    """Contact ``c``, known in a frame (r, t), in the world."""
+    return Contact(c.d, add(t, rotate(r, c.a)), add(t, rotate(r, c.b)), rotate(r, c.normal))
 
 
 @njit
@@ -127,18 +132,29 @@ def relative_pose(r_a: Rot, t_a: Vec, parts: Parts, p: int) -> tuple[Rot, Vec]:
 
 @njit
 def lower_bound(body: Body, k: int, parts: Parts, p: int, r: Rot, t: Vec) -> float:
-    """A cheap lower bound of the signed distance of piece k and part p, whose frame is (r, t) in that of the piece.
+    """A cheap lower bound of the signed distance of piece k and part p, whose frame is (r, t) in that of the piece."""
+    part = parts.sets.info[p]
+    return gap_to_ball(body, k, add(rotate(r, vec3(part.centre)), t), part.reach, part.radius)
 
-    It is the gap between the piece's bounding box and the part's bounding ball, -inf where they overlap.
-    """
-    piece, part = body.sets.info[k], parts.sets.info[p]
-    c = add(rotate(r, vec3(part.centre)), t)
+
+@njit
+def block_bound(body: Body, k: int, parts: Parts, block: int, r: Rot, t: Vec) -> float:
+    """A lower bound of the signed distances of piece k and every part of the block, whose frame is (r, t) in that of
+    the piece."""
+    bounds = parts.block[block]
+    return gap_to_ball(body, k, add(rotate(r, vec3(bounds.centre)), t), bounds.reach, bounds.radius)
+
+
+@njit
+def gap_to_ball(body: Body, k: int, c: Vec, reach: float, radius: float) -> float:
+    """The gap between the bounding box of piece k and a ball that holds a core, less radii; -inf where they overlap."""
+    piece = body.sets.info[k]
     lower, upper = piece.lower, piece.upper
     x = max(lower[0] - c[0], 0.0, c[0] - upper[0])
     y = max(lower[1] - c[1], 0.0, c[1] - upper[1])
     z = max(lower[2] - c[2], 0.0, c[2] - upper[2])
-    gap: float = norm((x, y, z)) - part.reach
-    return gap - piece.radius - part.radius if gap > 0.0 else -np.inf
+    gap = norm((x, y, z)) - reach
+    return gap - piece.radius - radius if gap > 0.0 else -np.inf
 
 
 def new_work() -> Work:

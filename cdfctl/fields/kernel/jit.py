@@ -37,12 +37,12 @@ OPTIONS: dict[str, Any] = {
 
 def njit(function: Callable[P, T]) -> Callable[P, T]:
     """``numba.njit`` with the options of this package; the types of ``function`` are kept."""
-    if numba.config.DISABLE_JIT:  # a debugger or a coverage run wants plain Python
+    config: Any = numba.config
+    if config.DISABLE_JIT:  # a debugger or a coverage run wants plain Python
         return function
     folder = _kernel_cache()
     # Numba reads its cache folder once, when a function is decorated: lend it ours for that moment only, so that the
     # caches of other packages in the process stay where they are.
-    config: Any = numba.config
     theirs = config.CACHE_DIR
     config.CACHE_DIR = str(folder or theirs)
     try:

@@ -8,10 +8,25 @@ import numpy as np
 
 from cdfctl.errors import InputError
 from cdfctl.fields.kernel.jit import njit
-from cdfctl.fields.kernel.sets import ConvexSets, pack
+from cdfctl.fields.kernel.sets import ConvexSets, Records, pack
 from cdfctl.fields.kernel.vec import Rot, Vec, add, cross, dot, rot, store_rot, sub, vec
 from cdfctl.robots.convex import ConvexSet, convex_sets
 from cdfctl.types import Array, IntArray, Scene, Shape
+
+BLOCK_SIZE = 16  # most parts in a block
+
+_BLOCK = np.dtype(
+    [
+        ("first", np.int64),  # the parts of the block are first … last - 1
+        ("last", np.int64),
+        ("reach", np.float64),  # of a ball that holds the cores of the parts, m
+        ("radius", np.float64),  # greatest of the parts' radii, m
+        ("centre", np.float64, 3),  # of that ball, in the frame of the obstacle
+    ],
+    align=True,
+)
+BLOCK = np.dtype((np.record, _BLOCK))
+"""Some parts of one obstacle that lie together."""
 
 
 class Parts(NamedTuple):
@@ -21,6 +36,8 @@ class Parts(NamedTuple):
         sets: the p parts, in the frame of their obstacle.
         obstacle: (p,) the obstacle a part belongs to.
         first: (m+1,) the parts of obstacle o are first[o] … first[o+1] - 1.
+        block: (B,) of :data:`BLOCK`: neighbouring parts, so that far ones are left out together.
+        first_block: (m+1,) the blocks of obstacle o are first_block[o] … first_block[o+1] - 1.
         pose: (m, 7) of the obstacles in the world: origin (m), quaternion x y z w.
         rotation: (m, 3, 3) the matrix of that quaternion.
         twist: (m, 6) velocity of the origin (m/s), angular velocity (rad/s), world axes.
@@ -29,6 +46,8 @@ class Parts(NamedTuple):
     sets: ConvexSets
     obstacle: IntArray
     first: IntArray
+    block: Records
+    first_block: IntArray
     pose: Array
     rotation: Array
     twist: Array
@@ -58,19 +77,48 @@ class SceneParts:
 
 
 def parts_of(shapes: tuple[Shape, ...]) -> Parts:
-    """The arrays of ``shapes``, all at the origin and at rest."""
-    of_shape = [convex_sets(shape) for shape in shapes]
-    sets: list[ConvexSet] = [part for parts in of_shape for part in parts]
-    counts = np.array([len(parts) for parts in of_shape], dtype=np.int64)
+    """The arrays of ``shapes``, all at the origin and at rest. A shape's parts may come in another order."""
+    groups_of_shape = [_groups(list(convex_sets(shape))) for shape in shapes]
+    groups = [group for groups in groups_of_shape for group in groups]
+    sets = pack([part for group in groups for part in group])
+    parts_in_shape = np.array([sum(map(len, groups)) for groups in groups_of_shape], dtype=np.int64)
+    blocks_in_shape = np.array([len(groups) for groups in groups_of_shape], dtype=np.int64)
     m = len(shapes)
     return Parts(
-        sets=pack(sets),
-        obstacle=np.repeat(np.arange(m, dtype=np.int64), counts),
-        first=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
+        sets=sets,
+        obstacle=np.repeat(np.arange(m, dtype=np.int64), parts_in_shape),
+        first=_starts(parts_in_shape),
+        block=_bound_blocks(sets.info, _starts(np.array([len(group) for group in groups], dtype=np.int64))),
+        first_block=_starts(blocks_in_shape),
         pose=np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (m, 1)),
         rotation=np.tile(np.eye(3), (m, 1, 1)),
         twist=np.zeros((m, 6)),
     )
+
+
+def _groups(parts: list[ConvexSet]) -> list[list[ConvexSet]]:
+    """Halved across the longest side, again and again, until no group has more than ``BLOCK_SIZE`` parts."""
+    if len(parts) <= BLOCK_SIZE:
+        return [parts]
+    middles = np.array([part.vertices.mean(axis=0) for part in parts])
+    order = np.argsort(middles[:, np.argmax(np.ptp(middles, axis=0))], kind="stable")
+    half = len(parts) // 2
+    return _groups([parts[i] for i in order[:half]]) + _groups([parts[i] for i in order[half:]])
+
+
+def _starts(counts: IntArray) -> IntArray:
+    return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+
+
+def _bound_blocks(info: Records, starts: IntArray) -> Records:
+    block = np.zeros(len(starts) - 1, dtype=BLOCK)
+    for record, first, last in zip(block, starts[:-1], starts[1:], strict=True):
+        part = info[first:last]
+        centre = part["centre"].mean(axis=0)
+        record["first"], record["last"], record["centre"] = first, last, centre
+        record["reach"] = (np.linalg.norm(part["centre"] - centre, axis=1) + part["reach"]).max()
+        record["radius"] = part["radius"].max()
+    return block
 
 
 @njit

@@ -8,7 +8,16 @@ from typing import NamedTuple
 import numpy as np
 
 from cdfctl.fields.kernel.body import Body, Frames, forward, gradient, piece_pose
-from cdfctl.fields.kernel.distance import NO_CONTACT, Contact, Work, lower_bound, piece_distance, relative_pose
+from cdfctl.fields.kernel.distance import (
+    NO_CONTACT,
+    Contact,
+    Work,
+    block_bound,
+    lower_bound,
+    relative_pose,
+    signed_distance,
+    to_world,
+)
 from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.parts import Parts, time_derivative
 from cdfctl.fields.kernel.vec import ZERO, store
@@ -72,29 +81,45 @@ def nearest_pair(
 ) -> tuple[int, Contact]:
     """The piece among ``first`` … ``last`` - 1 nearest to obstacle o, and the contact; (-1, no contact) for none.
 
-    The pair with the least lower bound is measured first, then every pair whose lower bound is below the best.
+    The block of parts with the least lower bound is measured first, then every one whose bound is below the best.
     """
-    start_k, start_p, least = -1, -1, np.inf
-    if last - first == 1 and parts.first[o + 1] - parts.first[o] == 1:
-        return first, piece_distance(body, frames, first, parts, parts.first[o], ZERO, np.inf, work)
+    start_k, start_block, least = -1, -1, np.inf
+    first_block, last_block = parts.first_block[o], parts.first_block[o + 1]
+    if (last - first) * (last_block - first_block) == 1:
+        return nearest_in_block(body, frames, first, parts, first_block, -1, NO_CONTACT, work)
     for k in range(first, last):
         r_a, t_a = piece_pose(body, frames, k)
-        for p in range(parts.first[o], parts.first[o + 1]):
-            r, t = relative_pose(r_a, t_a, parts, p)
-            bound = lower_bound(body, k, parts, p, r, t)
+        r, t = relative_pose(r_a, t_a, parts, parts.first[o])
+        for block in range(first_block, last_block):
+            bound = block_bound(body, k, parts, block, r, t)
             if start_k < 0 or bound < least:
-                start_k, start_p, least = k, p, bound
+                start_k, start_block, least = k, block, bound
     if start_k < 0:
         return -1, NO_CONTACT
-    best_k, best = start_k, piece_distance(body, frames, start_k, parts, start_p, ZERO, np.inf, work)
+    best_k, best = nearest_in_block(body, frames, start_k, parts, start_block, -1, NO_CONTACT, work)
     for k in range(first, last):
         r_a, t_a = piece_pose(body, frames, k)
-        for p in range(parts.first[o], parts.first[o + 1]):
-            r, t = relative_pose(r_a, t_a, parts, p)
-            if lower_bound(body, k, parts, p, r, t) < best.d and not (k == start_k and p == start_p):
-                contact = piece_distance(body, frames, k, parts, p, ZERO, best.d, work)
-                if contact.d < best.d:
-                    best_k, best = k, contact
+        r, t = relative_pose(r_a, t_a, parts, parts.first[o])
+        for block in range(first_block, last_block):
+            if block_bound(body, k, parts, block, r, t) < best.d and not (k == start_k and block == start_block):
+                best_k, best = nearest_in_block(body, frames, k, parts, block, best_k, best, work)
+    return best_k, best
+
+
+@njit
+def nearest_in_block(
+    body: Body, frames: Frames, k: int, parts: Parts, block: int, best_k: int, best: Contact, work: Work
+) -> tuple[int, Contact]:
+    """Piece k and the part of a block nearest to it, if that is nearer than ``best``; else ``best`` of ``best_k``."""
+    r_a, t_a = piece_pose(body, frames, k)
+    bounds = parts.block[block]
+    r, t = relative_pose(r_a, t_a, parts, bounds.first)
+    alone = bounds.last - bounds.first == 1
+    for p in range(bounds.first, bounds.last):
+        if alone or lower_bound(body, k, parts, p, r, t) < best.d:
+            c = signed_distance(body.sets, k, parts.sets, p, r, t, ZERO, best.d, work)
+            if c.d < best.d or best_k < 0:
+                best_k, best = k, to_world(r_a, t_a, c)
     return best_k, best
 
 
