@@ -5,41 +5,65 @@ Joint goal (also the hold task, whose goal is the pose to hold):
     u_ref = K (q_goal - q)
 
 not clipped: the velocity bounds are the QP's. A continuous joint goes the shorter way round.
+
+Reach: u_ref = 0, and the Lyapunov row of :mod:`cdfctl.control.reaching` does the rest.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
 
 from cdfctl.control.core import Core
 from cdfctl.control.parameters import resolved
+from cdfctl.control.reaching import Reaching
 from cdfctl.errors import InputError
+from cdfctl.fields.field import make_field
 from cdfctl.robots.robot import Robot
-from cdfctl.scenario.schema import ControllerConfig, HoldTask, JointGoalTask, Task
+from cdfctl.scenario.schema import ControllerConfig, HoldTask, JointGoalTask, ReachTask, Task
+from cdfctl.scenario.variants import TASKS_OF
 from cdfctl.types import Array, BoolArray, Decision, Scene, State, as_vector
 
 Nominal = Callable[[State, Scene], Array]
 
 
 class Controller:
-    """A task's nominal velocity and the core that makes it safe. Build it by :func:`build`."""
+    """A task's nominal velocity and the core that makes it safe. Build it by :func:`build`.
 
-    def __init__(self, core: Core, nominal: Nominal) -> None:
+    Attributes:
+        core: field, rows and QP.
+        reaching: what draws the robot to a target, None for a task without one.
+    """
+
+    def __init__(self, core: Core, nominal: Nominal, reaching: Reaching | None = None) -> None:
         self.core = core
+        self.reaching = reaching
         self._nominal = nominal
 
-    def step(self, state: State, scene: Scene) -> Decision:
-        """What to command now. Raises :class:`cdfctl.errors.InputError` where ``state`` or ``scene`` is not finite."""
+    def step(self, state: State, scene: Scene, target: Scene | None = None) -> Decision:
+        """What to command now; ``target`` is a scene of the one body to reach, for a reach task.
+
+        Raises:
+            InputError: ``state``, ``scene`` or ``target`` is not finite, or there is no target where one is needed.
+        """
         as_vector(state.q, self.core.robot.n, "q")
-        return self.core.step(state.q, scene, self._nominal(state, scene))
+        u_ref = self._nominal(state, scene)
+        if self.reaching is None:
+            return self.core.step(state.q, scene, u_ref)
+        if target is None:
+            raise InputError("a reach task needs its target at every step")
+        row, V = self.reaching.row(state.q, target)
+        return replace(self.core.step(state.q, scene, u_ref, row), V=V)
 
     def reset(self) -> None:
         """Forget the steps so far: warm starts and ``u_last``."""
         self.core.reset()
+        if self.reaching is not None:
+            self.reaching.reset()
 
 
 def build(robot: Robot, config: ControllerConfig, task: Task, dt: float) -> Controller:
@@ -50,7 +74,13 @@ def build(robot: Robot, config: ControllerConfig, task: Task, dt: float) -> Cont
             does not do.
     """
     variant, parameters = resolved(config)
-    return Controller(Core(robot, variant, parameters, dt), nominal(robot, task, parameters.gain))
+    if task.type not in TASKS_OF[variant.task]:
+        allowed = ", ".join(TASKS_OF[variant.task])
+        raise InputError(f"controller '{variant.name}' cannot do task '{task.type}'", hint=f"allowed: {allowed}")
+    reaching = None
+    if isinstance(task, ReachTask):
+        reaching = Reaching(make_field(variant.field, robot), parameters.gamma, dt)
+    return Controller(Core(robot, variant, parameters, dt), nominal(robot, task, parameters.gain), reaching)
 
 
 def nominal(robot: Robot, task: Task, gain: float) -> Nominal:
@@ -60,8 +90,9 @@ def nominal(robot: Robot, task: Task, gain: float) -> Nominal:
             goal = as_vector(cast("tuple[float, ...]", task.goal), robot.n, "task.goal")
         case HoldTask():
             goal = as_vector(cast("tuple[float, ...]", task.pose), robot.n, "task.pose")
-        case _:
-            raise InputError(f"no controller here does the task '{task.type}'", hint="allowed: joint-goal, hold")
+        case ReachTask():
+            still = np.zeros(robot.n)
+            return lambda state, scene: still
 
     def toward_goal(state: State, scene: Scene) -> Array:
         return gain * difference(goal, state.q, robot.continuous)

@@ -16,7 +16,6 @@ from cdfctl.robots.robot import Robot
 from cdfctl.scenario.variants import FieldKind, Variant
 from cdfctl.types import Array, Decision, FieldQuery, Rows, Scene
 
-
 # The fields a variant asks, the one whose barrier is reported as h first.
 FIELDS_OF: Mapping[FieldKind, tuple[str, ...]] = {"sdf": ("sdf",), "cdf": ("cdf",), "dual": ("cdf", "sdf")}
 

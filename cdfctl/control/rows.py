@@ -71,6 +71,40 @@ def hyperplane_rows(query: FieldQuery, offset: float, dt: float) -> Rows:
     return _soft_rows("hyperplane", -query.dq[k] * dt, logarithm)
 
 
+def tvclf_row(now: float, ahead: FieldQuery, gamma: float, dt: float) -> Rows:
+    """Time-varying control Lyapunov function: the distance to a moving target falls at the rate ``gamma``, or ``delta``
+    pays for it.
+
+        grad V+ . u <= -gamma V - (V+ - V) / Dt + delta,      delta >= 0
+
+    with V the distance to the target where it is, V+ to where it will be one step on. This is the exact discretisation
+    of ``grad V . u + dV/dt <= -gamma V + delta``: the time term of the latter looks along the tangent only, and stalls.
+
+    Args:
+        now: V, in the unit of the field; +inf where the target cannot be touched now.
+        ahead: the field's one row for the target at ``t + dt``: V+ and its gradient.
+        gamma: rate, 1/s.
+        dt: Dt, the control period, s.
+
+    Returns:
+        One hard row with the slack, or none where V+ is out of reach. Where only V is, the target comes within reach
+        in this step; V+ then stands for V, without a time term.
+
+    Source: the paper's TVCLF condition, discretised.
+    """
+    k = usable(ahead)
+    V_next = ahead.d[k]
+    count = V_next.shape[0]
+    V = np.full(count, now) if np.isfinite(now) else V_next
+    return Rows(
+        G=ahead.dq[k],
+        rhs=-gamma * V - (V_next - V) / dt,
+        soft=np.zeros(count, dtype=np.bool_),
+        delta=np.ones(count),
+        names=("tvclf",) * count,
+    )
+
+
 def joint_limit_box(q: Array, lower: Array, upper: Array, velocity_limit: Array, alpha: float) -> tuple[Array, Array]:
     """Joint limits as barriers inside the velocity box, both as bounds on ``u`` (n,).
 

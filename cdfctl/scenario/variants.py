@@ -139,6 +139,22 @@ VARIANTS: Mapping[str, Variant] = MappingProxyType(
                 source="paper, baseline: separating hyperplanes of its predecessor",
             ),
             Variant(
+                name="cdf-sh-qp",
+                field="cdf",
+                safety="hyperplane",
+                task="joint-goal",
+                equation="-dd/dq . u Dt <= ln(d + b),  d = d_c",
+                source="paper, baseline: separating hyperplanes with the configuration-space distance",
+            ),
+            Variant(
+                name="cdf-tvcbf-tvclf-qp",
+                field="cdf",
+                safety="tvcbf",
+                task="tvclf",
+                equation="as cdf-tvcbf-qp, and dV+/dq . u <= -gamma V - (V+ - V)/Dt + delta,  V = d_c of the target",
+                source="paper, whole-body reaching",
+            ),
+            Variant(
                 name="sdf-tvcbf-tvclf-qp",
                 field="sdf",
                 safety="tvcbf",

@@ -12,10 +12,10 @@ from cdfctl.scenario.draws import draw
 from cdfctl.scenario.library import ScenarioFile
 from cdfctl.scenario.problems import path_text
 from cdfctl.scenario.resolve import resolve
-from cdfctl.scenario.schema import Scenario
+from cdfctl.scenario.schema import ReachTask, Scenario
 from cdfctl.scenario.values import Complaint
 from cdfctl.simulation.checks import robot_complaints, robot_of, scenario_complaints
-from cdfctl.simulation.goals import goal_of
+from cdfctl.simulation.goals import Goal, Touch, goal_of
 from cdfctl.simulation.judge import judge
 from cdfctl.simulation.motion import SceneMotion
 from cdfctl.simulation.plant import KinematicPlant
@@ -115,13 +115,24 @@ def _assemble(scenario: Scenario, trial: int, robot: Robot | None) -> Trial:
         raise _MisfitError(complaints)
     simulation = scenario.simulation
     motion = SceneMotion(scenario.obstacles)
+    controller = build(robot, scenario.controller, scenario.task, simulation.dt)
+    target: SceneMotion | None = None
+    goal: Goal
+    if isinstance(scenario.task, ReachTask):
+        target = SceneMotion((scenario.task.target,))
+        assert controller.reaching is not None  # build() has seen the same task
+        assert scenario.controller.reach_tolerance is not None  # and the scenario is resolved
+        goal = Touch(controller.reaching, target, scenario.controller.reach_tolerance)
+    else:
+        goal = goal_of(scenario.task, robot, simulation.tolerance)
     rollout = Rollout(
-        build(robot, scenario.controller, scenario.task, simulation.dt),
+        controller,
         KinematicPlant(),
         motion,
-        goal_of(scenario.task, robot, simulation.tolerance),
+        goal,
         vector_of(scenario.robot.q0),
         dt=simulation.dt,
         time_limit=simulation.time_limit,
+        target=target,
     )
     return Trial(scenario, trial, robot, motion, rollout)

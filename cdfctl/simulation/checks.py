@@ -12,7 +12,8 @@ from collections.abc import Iterator, Sequence
 from cdfctl.control.solvers import check_solver
 from cdfctl.errors import InputError, name_hint
 from cdfctl.robots.robot import Robot, load_robot
-from cdfctl.scenario.schema import HoldTask, JointGoalTask, RobotConfig, Scenario
+from cdfctl.scenario.schema import HoldTask, JointGoalTask, ReachTask, RobotConfig, Scenario
+from cdfctl.scenario.shapes import Body
 from cdfctl.scenario.values import Complaint
 from cdfctl.simulation.clearance import nearest
 from cdfctl.simulation.judge import CONTACT
@@ -123,11 +124,14 @@ def _solver(scenario: Scenario) -> Iterator[Complaint]:
 
 
 def _shapes(scenario: Scenario) -> Iterator[Complaint]:
-    for i, obstacle in enumerate(scenario.obstacles):
+    bodies: list[tuple[Place, Body]] = [(("obstacles", i), body) for i, body in enumerate(scenario.obstacles)]
+    if isinstance(scenario.task, ReachTask):
+        bodies.append((("task", "target"), scenario.task.target))
+    for place, body in bodies:
         try:
-            shape_of(obstacle.shape)
+            shape_of(body.shape)
         except InputError as error:
-            yield error.message, error.hint, ("obstacles", i, "shape")
+            yield error.message, error.hint, (*place, "shape")
 
 
 def _start_in_contact(scenario: Scenario, robot: Robot) -> Iterator[Complaint]:

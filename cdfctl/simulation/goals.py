@@ -3,24 +3,48 @@
 joint goal   |q_goal - q|_2 <= tolerance
 hold         the same for the pose, and all obstacles' origins beyond the plane of ``until``; without ``until``, at
              the time limit only
+reach        V <= reach_tolerance, V the distance of robot and target in the controller's field
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from cdfctl.control.controller import difference
-from cdfctl.errors import InputError
+from cdfctl.control.reaching import Reaching
 from cdfctl.robots.robot import Robot
-from cdfctl.scenario.schema import BeyondConfig, HoldTask, JointGoalTask, Task
+from cdfctl.scenario.schema import BeyondConfig, HoldTask, JointGoalTask
+from cdfctl.simulation.motion import SceneMotion
 from cdfctl.simulation.shapes import vector_of
 from cdfctl.types import Array, Scene, State
 
 
+class Goal(Protocol):
+    """The test of a task."""
+
+    def reached(self, state: State, scene: Scene, *, at_end: bool) -> bool:
+        """Whether the task is done in this ``state`` and ``scene``; ``at_end`` at the time limit."""
+        ...
+
+
 @dataclass(frozen=True)
-class Goal:
+class Touch:
+    """A target to be touched: V within ``tolerance`` (in the unit of the field)."""
+
+    reaching: Reaching
+    target: SceneMotion
+    tolerance: float
+
+    def reached(self, state: State, scene: Scene, *, at_end: bool) -> bool:
+        """Whether V <= tolerance at the target's place now."""
+        return self.reaching.value(state.q, self.target.at(state.t)) <= self.tolerance
+
+
+@dataclass(frozen=True)
+class Configuration:
     """A configuration to be at, and what else must be so.
 
     Attributes:
@@ -46,16 +70,14 @@ class Goal:
         return float(np.linalg.norm(difference(self.q, state.q, self.robot.continuous))) <= self.tolerance
 
 
-def goal_of(task: Task, robot: Robot, tolerance: float) -> Goal:
-    """The goal of a scenario's task."""
+def goal_of(task: JointGoalTask | HoldTask, robot: Robot, tolerance: float) -> Configuration:
+    """The goal of a task that ends at a configuration, within ``tolerance`` (rad)."""
     match task:
         case JointGoalTask():
-            return Goal(robot, vector_of(task.goal), tolerance)
+            return Configuration(robot, vector_of(task.goal), tolerance)
         case HoldTask():
             beyond = task.until.obstacles_beyond if task.until is not None else None
-            return Goal(robot, vector_of(task.pose), tolerance, beyond, only_at_end=beyond is None)
-        case _:
-            raise InputError(f"no goal is known for the task '{task.type}'", hint="allowed: joint-goal, hold")
+            return Configuration(robot, vector_of(task.pose), tolerance, beyond, only_at_end=beyond is None)
 
 
 def passed(scene: Scene, beyond: BeyondConfig) -> bool:

@@ -58,10 +58,11 @@ class Rollout:
         *,
         dt: float,
         time_limit: float,
+        target: SceneMotion | None = None,
     ) -> None:
-        """``q0`` (n,) is the start; ``dt`` and ``time_limit`` are in s."""
+        """``q0`` (n,) is the start; ``dt`` and ``time_limit`` are in s; ``target`` is the one body of a reach task."""
         self._controller, self._plant, self._motion, self._goal = controller, plant, motion, goal
-        self._start, self._dt = State(0.0, q0), dt
+        self._start, self._dt, self._target = State(0.0, q0), dt, target
         self.max_steps = math.floor(time_limit / dt + 1e-9)  # a limit of 20 s is 200 steps of 0.1 s, not 199
         self.stop: Stop = "error"
         self.reason: str | None = "interrupted"
@@ -77,7 +78,7 @@ class Rollout:
         state, scene = self._start, self._motion.at(self._start.t)
         self._recorder.start(state, scene)
         controller.reset()
-        controller.step(state, scene)
+        controller.step(state, scene, self._target_at(state))
         controller.reset()
         for index in range(self.max_steps + 1):
             at_end = index == self.max_steps
@@ -85,8 +86,9 @@ class Rollout:
                 return self._end("reached")
             if at_end:
                 return self._end("timeout")
+            target = self._target_at(state)
             began = time.perf_counter()
-            decision = controller.step(state, scene)
+            decision = controller.step(state, scene, target)
             elapsed = time.perf_counter() - began
             if decision.status == "infeasible":
                 return self._end("infeasible")
@@ -98,6 +100,9 @@ class Rollout:
             now, state, scene = Step(index, state, scene, decision), after, self._motion.at(after.t)
             self._recorder.add(decision, elapsed, state, scene)
             yield now
+
+    def _target_at(self, state: State) -> Scene | None:
+        return None if self._target is None else self._target.at(state.t)
 
     def _end(self, stop: Stop) -> None:
         self.stop, self.reason = stop, None

@@ -11,7 +11,7 @@ from cdfctl.report import speed, stack
 from cdfctl.scenario.library import scenarios_dir
 
 ROBOTS = {"planar", "franka", "ur5", "ur10", "xarm7", "kinova", "z1"}
-SCENARIOS = {"S1", "S2", "S3", "C1", "C2", "C3", "planar-1", "reach"}
+SCENARIOS = {"S1", "S2", "S3", "C1", "C2", "C3", "planar-1", "reach", "reach-collinear"}
 
 
 @pytest.mark.parametrize(("command", "names"), [("robots", ROBOTS), ("scenarios", SCENARIOS)])

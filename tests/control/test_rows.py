@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdfctl.control.rows import cbf_rows, hyperplane_rows, joint_limit_box, stack, tvcbf_rows, usable
+from cdfctl.control.rows import cbf_rows, hyperplane_rows, joint_limit_box, stack, tvcbf_rows, tvclf_row, usable
 from cdfctl.types import FieldQuery
 
 L, C, RADIUS, V = 1.0, 1.6, 0.3, -0.7
@@ -102,6 +102,25 @@ def test_hyperplane_without_logarithm_allows_nothing() -> None:
     rows = hyperplane_rows(rows_query([-0.3, -0.5, 0.7], [True] * 3), 0.3, 0.1)
     assert rows.rhs[:2].tolist() == [-np.inf, -np.inf]
     assert rows.rhs[2] == pytest.approx(0.0)
+
+
+def test_tvclf_symbol_by_symbol() -> None:
+    """The ball of this file as a target: V where it is, V+ where it will be."""
+    q, gamma, dt = 0.4, 1.5, 0.1
+    now = float(np.hypot(L * np.cos(q), C - L * np.sin(q))) - RADIUS
+    then = float(np.hypot(L * np.cos(q), C + V * dt - L * np.sin(q))) - RADIUS
+    ahead = rows_query([then], [True])
+    rows = tvclf_row(now, ahead, gamma, dt)
+    assert rows.G.tolist() == ahead.dq.tolist()
+    assert rows.rhs == pytest.approx([-gamma * now - (then - now) / dt])
+    assert rows.delta.tolist() == [1.0]
+    assert rows.soft.tolist() == [False]
+    assert rows.names == ("tvclf",)
+
+
+def test_tvclf_out_of_reach_gives_no_row_or_none_of_time() -> None:
+    assert tvclf_row(0.7, rows_query([np.inf], [False]), 1.0, 0.1).G.shape == (0, 2)
+    assert tvclf_row(np.inf, rows_query([0.5], [True]), 2.0, 0.1).rhs == pytest.approx([-1.0])
 
 
 def test_only_valid_and_finite_rows_take_part() -> None:

@@ -27,7 +27,7 @@ from cdfctl.scenario.yaml_loader import read
 
 from .conftest import GOOD
 
-NAMES = ["C1", "C2", "C3", "S1", "S2", "S3", "planar-1", "reach"]
+NAMES = ["C1", "C2", "C3", "S1", "S2", "S3", "planar-1", "reach-collinear", "reach"]
 POSE = (0.35, -0.32, -1.70, 0.18, 2.05, -0.20)
 
 
@@ -42,10 +42,12 @@ def test_shipped_scenarios(name):
     assert scenario.name == name
     assert scenario.source
     assert scenario.assumptions
-    assert scenario.controller.variant == "sdf-tvcbf-qp"
+    assert scenario.controller.variant == ("cdf-tvcbf-tvclf-qp" if name.startswith("reach") else "sdf-tvcbf-qp")
+    check_runnable(scenario)
     assert scenario.robot.limits.velocity == 2.0
     assert (scenario.simulation.dt, scenario.simulation.time_limit) == (0.1, 20.0)
-    assert scenario.controller.gain == (4.0 if name[0] == "C" else 9.9)
+    if not name.startswith("reach"):
+        assert scenario.controller.gain == (4.0 if name[0] == "C" else 9.9)
     assert has_draws(scenario) == (name[0] in "SC")
 
 
@@ -109,10 +111,10 @@ def test_resolve_writes_every_default():
     assert (resolved.on_infeasible, resolved.links, resolved.solver) == ("least-violation", "nearest", "daqp")
 
 
-def test_reach_is_valid_but_cannot_run_without_a_controller_for_it():
-    file = load_scenario("reach")
-    if any(variant.task == "tvclf" for variant in VARIANTS.values()):
-        pytest.skip("a controller for it has come")
+def test_reach_is_valid_but_cannot_run_without_a_controller_for_it(monkeypatch):
+    file = load_scenario("reach", ["controller.variant=sdf-tvcbf-qp"])
+    others = {name: variant for name, variant in VARIANTS.items() if variant.task != "tvclf"}
+    monkeypatch.setattr(sys.modules["cdfctl.scenario.resolve"], "VARIANTS", others)
     with pytest.raises(ScenarioErrors, match="task 'reach' is not available yet") as caught:
         file.check_runnable()
     (problem,) = caught.value.problems
@@ -187,9 +189,13 @@ def test_every_field_is_described():
 def test_a_controller_that_cannot_do_the_task(monkeypatch):
     reaching = dataclasses.replace(VARIANTS["sdf-cbf-qp"], name="reaching", task="tvclf")
     # By sys.modules: the package's function of the same name hides the module.
-    monkeypatch.setattr(sys.modules["cdfctl.scenario.resolve"], "VARIANTS", {**VARIANTS, "reaching": reaching})
+    monkeypatch.setattr(
+        sys.modules["cdfctl.scenario.resolve"],
+        "VARIANTS",
+        {"reaching": reaching, "sdf-tvcbf-qp": VARIANTS["sdf-tvcbf-qp"]},
+    )
     with pytest.raises(ScenarioErrors, match="controller 'sdf-tvcbf-qp' cannot do task 'reach'") as caught:
-        load_scenario("reach").check_runnable()
+        load_scenario("reach", ["controller.variant=sdf-tvcbf-qp"]).check_runnable()
     (problem,) = caught.value.problems
     assert problem.field == "controller.variant"
     assert problem.hint == "controllers for it: reaching; tasks of sdf-tvcbf-qp: joint-goal, hold"

@@ -149,9 +149,19 @@ def test_a_given_robot_is_used(file: Path) -> None:
     assert assemble(load_scenario(file), robot=first.robot).robot is first.robot
 
 
-def test_a_task_not_there_yet_is_named() -> None:
-    with pytest.raises(ScenarioErrors, match="reach"):
-        assemble(load_scenario("reach"))
+def test_a_task_the_controller_does_not_do_is_named() -> None:
+    with pytest.raises(ScenarioErrors, match="cannot do task 'reach'"):
+        assemble(load_scenario("reach", ["controller.variant=sdf-tvcbf-qp"]))
+
+
+def test_the_file_of_a_target_s_shape_is_looked_at(file: Path, tmp_path: Path) -> None:
+    (tmp_path / "flat.stl").write_text("solid\nendsolid\n")
+    target = "type: reach\n  target: {position: [2.0, 2.0, 0.0], shape: {type: mesh, file: flat.stl}}"
+    text = PLANAR.replace("type: joint-goal\n  goal: [1.0, 0.5]", target)
+    file.write_text(text + "controller: {variant: sdf-tvcbf-tvclf-qp}\n")
+    with pytest.raises(ScenarioErrors) as caught:
+        assemble(load_scenario(file))
+    assert [problem.field for problem in caught.value.problems] == ["task.target.shape"]
 
 
 def test_limits_of_the_planar_arm_are_pi(file: Path) -> None:
