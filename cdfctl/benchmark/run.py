@@ -1,0 +1,91 @@
+"""Many trials at once: joblib over worker processes of this machine (loky), or over a Dask cluster by the same calls.
+
+A worker that dies takes the trials in flight with it. Each of those is run once more, by itself; what dies again is
+recorded as an error, with the reason, and the rest goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Sequence
+from concurrent.futures import BrokenExecutor
+from contextlib import closing
+from dataclasses import dataclass, field
+from typing import Any
+
+import joblib
+
+from cdfctl.benchmark.plan import Plan
+from cdfctl.benchmark.trial import Answer, Keep, failed, run_trial
+
+DIED = "the worker process died twice in this trial"
+
+
+@dataclass
+class Runner:
+    """Runs trials of a plan.
+
+    Attributes:
+        plan: what to run.
+        jobs: worker processes of this machine; one means this process itself.
+        keep: whose runs to hand back.
+        cluster: a Dask client, or None for this machine.
+    """
+
+    plan: Plan
+    jobs: int
+    keep: Keep
+    cluster: Any = None
+    _sent: list[int] = field(default_factory=list, repr=False)
+
+    def run(self, places: Sequence[int]) -> Generator[Answer, None, None]:
+        """The answers of the trials at these places of the plan, as they come."""
+        waiting = list(places)
+        while waiting:
+            self._sent = []
+            back = set()
+            try:
+                with closing(self._parallel(waiting)) as answers:
+                    for place, answer in answers:
+                        back.add(place)
+                        yield answer
+                return
+            except BrokenExecutor:
+                suspects = [place for place in self._sent if place not in back]
+            for place in suspects:
+                yield self._alone(place)
+            waiting = [place for place in waiting if place not in back and place not in suspects]
+
+    def _alone(self, place: int) -> Answer:
+        try:
+            with closing(self._parallel([place])) as answers:
+                answer: Answer = next(answers)[1]
+                return answer
+        except BrokenExecutor:
+            cell, trial = self.plan[place]
+            return Answer(failed(cell.key(trial), DIED), 0.0)
+
+    def _parallel(self, places: Sequence[int]) -> Any:
+        """A generator of (place, answer), in the order in which they come."""
+        if self.cluster is not None:
+            backend, jobs = joblib.parallel_config(backend="dask", client=self.cluster), -1
+        else:
+            backend, jobs = joblib.parallel_config(backend="loky", inner_max_num_threads=1), self.jobs
+        with backend:
+            # One trial a task: what is sent ahead is what a death can take along.
+            parallel = joblib.Parallel(jobs, return_as="generator_unordered", batch_size=1, pre_dispatch="2*n_jobs")
+        return parallel(self._tasks(places))
+
+    def _tasks(self, places: Sequence[int]) -> Iterator[Any]:
+        for place in places:
+            self._sent.append(place)
+            cell, trial = self.plan[place]
+            yield joblib.delayed(_placed)(place, cell, trial, self.keep)
+
+
+def _placed(place: int, *arguments: Any) -> tuple[int, Answer]:
+    return place, run_trial(*arguments)
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    return int(joblib.cpu_count())
