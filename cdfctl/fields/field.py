@@ -55,8 +55,9 @@ def _sdf(robot: Robot) -> Field:
 
 def _cdf(robot: Robot) -> Field:
     from cdfctl.fields.cdf import CDF
+    from cdfctl.fields.table.store import cached_table
 
-    return CDF(robot)
+    return CDF(robot, cached_table(robot))
 
 
 # A new field is one line here. Values import their module when called: the compiled kernels take a while to load.

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cdfctl.fields.kernel.jit import njit
+from cdfctl.fields.kernel.jit import njit, njit_inline
 from cdfctl.fields.kernel.sets import ConvexSets, support
 from cdfctl.fields.kernel.simplex import nearest_on_segment, nearest_on_tetrahedron, nearest_on_triangle
 from cdfctl.fields.kernel.vec import ZERO, Rot, Vec, add, along, dot, rotate, rotate_back, scale, sub
@@ -96,7 +96,7 @@ def core_distance(
     return CoreDistance(sqrt(best_vv), best_a, sub(best_a, v), v, False, False)
 
 
-@njit
+@njit_inline
 def support_of_difference(
     sets_a: ConvexSets, i: int, sets_b: ConvexSets, j: int, r: Rot, t: Vec, s: Vec
 ) -> tuple[Vec, Vec]:
@@ -106,14 +106,14 @@ def support_of_difference(
     return a, sub(a, add(rotate(r, b), t))
 
 
-@njit
+@njit_inline
 def store_vertex(simplex: Simplex, k: int, w: Vec, a: Vec) -> None:
     """Vertex k of the simplex."""
     simplex.w[k, 0], simplex.w[k, 1], simplex.w[k, 2] = w[0], w[1], w[2]
     simplex.a[k, 0], simplex.a[k, 1], simplex.a[k, 2] = a[0], a[1], a[2]
 
 
-@njit
+@njit_inline
 def has_vertex(simplex: Simplex, size: int, w: Vec) -> bool:
     """Whether ``w`` is a vertex already: then it brings the search no further."""
     for k in range(size):  # noqa: SIM110 - numba compiles no generators here
@@ -122,7 +122,7 @@ def has_vertex(simplex: Simplex, size: int, w: Vec) -> bool:
     return False
 
 
-@njit
+@njit_inline
 def reduce(simplex: Simplex, size: int) -> tuple[int, Vec, Vec]:
     """Drop the vertices that do not carry the point nearest to the origin; that point, and its partner on A."""
     w = simplex.w

@@ -1,4 +1,4 @@
-"""The compiler of the kernel: one decorator, ``njit``, so that every function is compiled the same way.
+"""The compiler of the kernel: ``njit``, so that every function is compiled the same way.
 
 - ``fastmath`` is off: distances must agree with another implementation to 1e-9, and NaN and infinity are meant.
 - ``error_model="numpy"``: a division by zero gives infinity instead of a branch to an exception.
@@ -37,6 +37,18 @@ OPTIONS: dict[str, Any] = {
 
 def njit(function: Callable[P, T]) -> Callable[P, T]:
     """``numba.njit`` with the options of this package; the types of ``function`` are kept."""
+    return _compiled(function, forceinline=False)
+
+
+def njit_inline(function: Callable[P, T]) -> Callable[P, T]:
+    """As :func:`njit`, for what the inner loops of GJK call: the body is put in place of the call.
+
+    A call passes its sets as some thirty numbers on the stack, which takes longer than finding a support point.
+    """
+    return _compiled(function, forceinline=True)
+
+
+def _compiled(function: Callable[P, T], forceinline: bool) -> Callable[P, T]:
     config: Any = numba.config
     if config.DISABLE_JIT:  # a debugger or a coverage run wants plain Python
         return function
@@ -46,7 +58,7 @@ def njit(function: Callable[P, T]) -> Callable[P, T]:
     theirs = config.CACHE_DIR
     config.CACHE_DIR = str(folder or theirs)
     try:
-        compiled = numba.njit(cache=folder is not None, **OPTIONS)(function)
+        compiled = numba.njit(cache=folder is not None, forceinline=forceinline, **OPTIONS)(function)
     finally:
         config.CACHE_DIR = theirs
     return cast(Callable[P, T], _plain_integers(compiled))

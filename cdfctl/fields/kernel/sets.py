@@ -22,7 +22,7 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from cdfctl.fields.kernel.jit import njit
+from cdfctl.fields.kernel.jit import njit_inline
 from cdfctl.fields.kernel.vec import Vec
 from cdfctl.types import Array, IntArray
 
@@ -147,7 +147,7 @@ def _cube_table(points: Array, usable: np.typing.NDArray[np.bool_], cells: int) 
     return np.concatenate(table).astype(np.int64)
 
 
-@njit
+@njit_inline
 def support(sets: ConvexSets, i: int, s: Vec) -> Vec:
     """A point of core i farthest in direction ``s``, in the frame of the set."""
     info = sets.info[i]
@@ -164,7 +164,7 @@ def support(sets: ConvexSets, i: int, s: Vec) -> Vec:
     return (x, y, z)
 
 
-@njit
+@njit_inline
 def _scan(vertices: Array, first: int, last: int, s: Vec) -> int:
     best, value = first, -np.inf
     for v in range(first, last):
@@ -174,7 +174,7 @@ def _scan(vertices: Array, first: int, last: int, s: Vec) -> int:
     return best
 
 
-@njit
+@njit_inline
 def _climb(sets: ConvexSets, start: int, s: Vec) -> int:
     vertices, edge, neighbour = sets.vertices, sets.edge, sets.neighbour
     best = start
@@ -190,7 +190,7 @@ def _climb(sets: ConvexSets, start: int, s: Vec) -> int:
     return best
 
 
-@njit
+@njit_inline
 def _cell(s: Vec, cells: int) -> int:
     """The cell of the cube around the origin that direction ``s`` goes through."""
     x, y, z = abs(s[0]), abs(s[1]), abs(s[2])

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
-from cdfctl.fields.kernel.jit import njit
+from cdfctl.fields.kernel.jit import njit, njit_inline
 from cdfctl.fields.kernel.vec import ZERO, Vec, along, cross, dot, scale, sub
 
 Weights: TypeAlias = tuple[float, float, float, float]
@@ -20,7 +20,7 @@ Weights: TypeAlias = tuple[float, float, float, float]
 VOLUME_TRUST = 1e-6  # barycentric coordinates of a tetrahedron that do not add up to one so well are not believed
 
 
-@njit
+@njit_inline
 def nearest_on_segment(a: Vec, b: Vec) -> tuple[Vec, Weights]:
     """The nearest point of segment ab."""
     ab = sub(b, a)
@@ -33,7 +33,7 @@ def nearest_on_segment(a: Vec, b: Vec) -> tuple[Vec, Weights]:
     return along(a, t, ab), (1.0 - t, t, 0.0, 0.0)
 
 
-@njit
+@njit_inline
 def nearest_on_triangle(a: Vec, b: Vec, c: Vec) -> tuple[Vec, Weights]:
     """The nearest point of triangle abc."""
     n = cross(sub(b, a), sub(c, a))
@@ -91,7 +91,7 @@ def nearest_on_tetrahedron(a: Vec, b: Vec, c: Vec, d: Vec) -> tuple[Vec, Weights
     return best, weights
 
 
-@njit
+@njit_inline
 def opposite(a: Vec, b: Vec, c: Vec, d: Vec) -> float:
     """Barycentric coordinate of the origin with respect to d: its height over face abc by that of d."""
     n = cross(sub(b, a), sub(c, a))
