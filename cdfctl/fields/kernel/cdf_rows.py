@@ -89,24 +89,25 @@ def contact_rows(
             if found.f[k] < found.f[nearest]:
                 nearest = k
         rows.f[o] = found.f[nearest]
-        centre = _centre(parts, o, vec(found.b, nearest))
+        centre, size = _ball_around(parts, o, vec(found.b, nearest))
         if found.f[nearest] < 0.0:
             rows.filled[o] = _escape_row(body, q, parts, o, memory, table, centre, rows, work)
             continue
-        count = nearest_contacts(body, q, parts, o, memory, table, centre, sheets, work.search)
+        count = nearest_contacts(body, q, parts, o, memory, table, centre, size, sheets, work.search)
         rows.filled[o] = count
         for i in range(count):
             _fill(body, q, parts, o, work.search, work.search.chosen[i], rows, i)
 
 
 @njit
-def _centre(parts: Parts, o: int, b: Vec) -> Vec:
-    """The middle of an obstacle of one part; of several, the point ``b`` of them that is nearest to the robot."""
+def _ball_around(parts: Parts, o: int, b: Vec) -> tuple[Vec, float]:
+    """A ball around an obstacle of one part; of several, the point ``b`` of them that is nearest to the robot."""
     p = parts.first[o]
     if parts.first[o + 1] - p != 1:
-        return b
+        return b, 0.0
     r, t = obstacle_pose(parts, o)
-    return add(rotate(r, vec3(parts.sets.info[p].centre)), t)
+    part = parts.sets.info[p]
+    return add(rotate(r, vec3(part.centre)), t), part.reach + part.radius
 
 
 @njit

@@ -9,9 +9,10 @@ f and the multiplier λ (least squares on the free joints)
     min 1/2 dᵀ B d + (x - q)ᵀ d   s.t.   f + gᵀ d = 0,    B = 1 + λ (H + σ Tᵀ T)
 
 where H_ij = -ν·(z_i × J_j), i <= j, is the exact second derivative of f for a contact point fixed to the link, T the
-Jacobian of that point within the tangent plane, and σ stands for the curvature of the two surfaces, which the kernel
-does not compute. B decides only how fast the iteration converges, never to what: an identity in its place needs twice
-the steps and fails four times as often.
+Jacobian of that point within the tangent plane, and σ stands for the curvature of the two surfaces. The kernel does not
+compute that one: σ begins with a constant and, near the end, follows from how the residual changed over the last step.
+B decides only how fast the iteration converges, never to what: an identity in its place needs twice the steps and fails
+four times as often.
 """
 
 from __future__ import annotations
@@ -34,7 +35,9 @@ from cdfctl.types import Array, IntArray
 FAR = 0.12  # rad of linearised distance to the surface, above which a step only restores
 LONGEST_RESTORATION = 1.0  # rad
 LONGEST_STEP = 0.35  # rad
-CURVATURE = 20.0  # σ, 1/m: of a surface of 5 cm radius; half and twice as much cost a fifth more steps
+CURVATURE = 20.0  # σ to begin with, 1/m: of a surface of 5 cm radius; half and twice as much cost a fifth more steps
+GREATEST_CURVATURE = 60.0  # 1/m
+LOCAL = 0.2  # rad: the residual below which a secant says something of the curvature at the contact
 STILL = 1e-9  # m/rad: no joint moves the contact
 
 
@@ -47,7 +50,8 @@ class Candidates(NamedTuple):
         f: (c,) signed distance there, m; ``g`` (c, n) its gradient.
         a, b, normal: (c, 3) witness points and normal in the world.
         slope: (c,) norm of g over the joints not at a limit.
-        multiplier: (c,) λ, and ``residual`` (c,) the norm of x - q + λ g over the joints free to move.
+        multiplier: (c,) λ, and ``residual`` (c,) the norm of z (c, n) = x - q + λ g over the joints free to move.
+        curvature: (c,) σ.
         cost: (c,) rad: the distance from q, and the linearised distance still to go to the surface.
         rotation, translation, axis: (c, n, 3, 3), (c, n, 3), (c, n, 3) the joints at x.
     """
@@ -62,6 +66,8 @@ class Candidates(NamedTuple):
     slope: Array
     multiplier: Array
     residual: Array
+    z: Array
+    curvature: Array
     cost: Array
     rotation: Array
     translation: Array
@@ -69,24 +75,41 @@ class Candidates(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Workspace of a step: ``B`` (n, n), ``J`` (n, 3) columns of the contact point, ``y`` (n,), and the solver's."""
+    """Workspace of a step: ``B`` (n, n), ``J`` (n, 3) columns of the contact point, ``y``, ``z`` (n,), ``normal``."""
 
     B: Array
     J: Array
     y: Array
+    z: Array
+    normal: Array
     quadratic: Quadratic
 
 
 def new_candidates(c: int, n: int) -> Candidates:
     """Places for ``c`` candidates of ``n`` joints."""
-    rows = (np.zeros((c, 3)), np.zeros((c, 3)), np.zeros((c, 3)), np.zeros(c), np.zeros(c), np.zeros(c), np.zeros(c))
-    frames = (np.zeros((c, n, 3, 3)), np.zeros((c, n, 3)), np.zeros((c, n, 3)))
-    return Candidates(np.zeros(c, dtype=np.int64), np.zeros((c, n)), np.zeros(c), np.zeros((c, n)), *rows, *frames)
+    return Candidates(
+        piece=np.zeros(c, dtype=np.int64),
+        x=np.zeros((c, n)),
+        f=np.zeros(c),
+        g=np.zeros((c, n)),
+        a=np.zeros((c, 3)),
+        b=np.zeros((c, 3)),
+        normal=np.zeros((c, 3)),
+        slope=np.zeros(c),
+        multiplier=np.zeros(c),
+        residual=np.zeros(c),
+        z=np.zeros((c, n)),
+        curvature=np.zeros(c),
+        cost=np.zeros(c),
+        rotation=np.zeros((c, n, 3, 3)),
+        translation=np.zeros((c, n, 3)),
+        axis=np.zeros((c, n, 3)),
+    )
 
 
 def new_scratch(n: int) -> Scratch:
     """A workspace for ``n`` joints."""
-    return Scratch(np.zeros((n, n)), np.zeros((n, 3)), np.zeros(n), new_quadratic(n))
+    return Scratch(np.zeros((n, n)), np.zeros((n, 3)), np.zeros(n), np.zeros(n), np.zeros(3), new_quadratic(n))
 
 
 @njit
@@ -131,6 +154,7 @@ def measure(body: Body, q: Array, found: Candidates, c: int) -> None:
             z = min(z, 0.0)  # at a limit only a pull back inside counts
         elif x[j] >= upper[j]:
             z = max(z, 0.0)
+        found.z[c, j] = z
         residual2 += z * z
     found.slope[c], found.multiplier[c], found.residual[c] = slope, multiplier, sqrt(residual2)
     found.cost[c] = sqrt(distance2) + abs(found.f[c]) / slope if slope > STILL else np.inf
@@ -143,7 +167,8 @@ def advance(
     """One step of candidate c, as described above; it must have been evaluated, and is again."""
     lower, upper = body.chain.lower, body.chain.upper
     x, g, y = found.x[c], found.g[c], scratch.y
-    if abs(found.f[c]) > FAR * found.slope[c]:
+    near = abs(found.f[c]) <= FAR * found.slope[c]
+    if not near:
         project(x, x, found.f[c], g, lower, upper, y)
         for j in range(y.shape[0]):
             y[j] -= x[j]
@@ -157,8 +182,38 @@ def advance(
         length2 += y[j] * y[j]
     share = min(1.0, longest / sqrt(length2)) if length2 > 0.0 else 0.0
     for j in range(y.shape[0]):
-        x[j] = min(max(x[j] + share * y[j], lower[j]), upper[j])
+        moved = min(max(x[j] + share * y[j], lower[j]), upper[j])
+        y[j] = moved - x[j]
+        x[j] = moved
+    multiplier, residual = found.multiplier[c], found.residual[c]
+    copy(found.z[c], scratch.z)
     evaluate(body, q, parts, o, found, c, work)
+    if near and multiplier > 0.0:
+        if residual < LOCAL and found.residual[c] < residual:
+            learn_curvature(found, c, multiplier, scratch)
+        else:
+            found.curvature[c] = CURVATURE
+
+
+@njit
+def learn_curvature(found: Candidates, c: int, multiplier: float, scratch: Scratch) -> None:
+    """σ from the last step d, ``scratch.y``, by the secant condition dᵀ(1 + λ (H + σ TᵀT)) d = dᵀ(z - z_before)."""
+    d, B, J = scratch.y, scratch.B, scratch.J
+    n = d.shape[0]
+    curved, observed, length2 = 0.0, 0.0, 0.0
+    w0, w1, w2 = 0.0, 0.0, 0.0
+    for i in range(n):
+        length2 += d[i] * d[i]
+        observed += d[i] * (found.z[c, i] - scratch.z[i])
+        w0, w1, w2 = w0 + d[i] * J[i, 0], w1 + d[i] * J[i, 1], w2 + d[i] * J[i, 2]
+        for j in range(n):
+            curved += d[i] * B[i, j] * d[j]
+    normal = scratch.normal
+    along = normal[0] * w0 + normal[1] * w1 + normal[2] * w2
+    tangential = multiplier * (w0 * w0 + w1 * w1 + w2 * w2 - along * along)
+    if tangential > 1e-3 * length2:
+        sigma = found.curvature[c] + (observed - curved) / tangential
+        found.curvature[c] = min(max(sigma, 0.0), GREATEST_CURVATURE)
 
 
 @njit
@@ -169,6 +224,8 @@ def hessian(body: Body, found: Candidates, c: int, scratch: Scratch) -> None:
     normal, a = vec(found.normal, c), vec(found.a, c)
     multiplier = max(0.0, found.multiplier[c])
     B, J = scratch.B, scratch.J
+    for i in range(3):
+        scratch.normal[i] = normal[i]
     for j in range(B.shape[0]):
         if not chain.moves[j, joint]:
             store(J, j, (0.0, 0.0, 0.0))
@@ -184,7 +241,7 @@ def hessian(body: Body, found: Candidates, c: int, scratch: Scratch) -> None:
             bend = 0.0
             if chain.moves[i, j] and chain.moves[j, joint] and not chain.prismatic[i]:
                 bend = -dot(normal, cross(vec(found.axis[c], i), J_j))
-            B[i, j] = multiplier * (bend + CURVATURE * tangential)
+            B[i, j] = multiplier * (bend + found.curvature[c] * tangential)
             B[j, i] = B[i, j]
         B[j, j] += 1.0
 

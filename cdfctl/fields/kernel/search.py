@@ -14,6 +14,7 @@ import numpy as np
 
 from cdfctl.fields.kernel.body import Body, forward, piece_pose
 from cdfctl.fields.kernel.contact import (
+    CURVATURE,
     Candidates,
     Scratch,
     advance,
@@ -23,22 +24,35 @@ from cdfctl.fields.kernel.contact import (
     new_scratch,
     restore,
 )
-from cdfctl.fields.kernel.distance import Work, lower_bound, new_work, piece_distance, relative_pose
+from cdfctl.fields.kernel.distance import NO_CONTACT, Work, block_bound, new_work, relative_pose
 from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.parts import Parts
 from cdfctl.fields.kernel.projection import copy
-from cdfctl.fields.kernel.starts import Starts, Table, new_starts, swing_starts, table_starts
-from cdfctl.fields.kernel.vec import ZERO, Vec
+from cdfctl.fields.kernel.rows import nearest_in_block
+from cdfctl.fields.kernel.starts import (
+    Samples,
+    Starts,
+    Table,
+    new_starts,
+    sample_starts,
+    spread_samples,
+    swing_starts,
+    table_starts,
+)
+from cdfctl.fields.kernel.vec import Vec
 from cdfctl.types import Array, BoolArray, IntArray
 
 SWINGS = 8  # one-joint turns kept as starts
+SPREAD = 12  # samples kept as starts
 ENTRIES = 8  # table entries kept as starts
-COLD_KEPT = 12  # starts that are followed, beyond the contacts asked for, without a memory
+COLD_KEPT = 16  # starts that are followed, beyond the contacts asked for, without a memory
 WARM_KEPT = 4  # and with one
 SECOND_KEPT = 4  # of these, those that go on after two steps
-SPARE = 1  # and those that are finished
+SPARE = 1  # contacts looked for beyond those asked for
+RETRIES = 2  # candidates that may turn out to be no contact, with a memory
 LAST_STEPS = 12
-CONVERGED = 5e-3  # rad: the residual at which a contact's distance is right to its square
+CLOSE = 5e-3  # rad: the residual at which a candidate's cost is good enough to compare
+CONVERGED = 1e-4  # rad: and at which a contact is done; its distance is right to the square of it
 ALIKE = 0.05  # rad: candidates of one piece nearer than this are one
 DISTINCT = 0.1  # rad: contacts nearer than this to a nearer one are not told apart
 UNKNOWN, NOTHING = 0, -1  # in a memory: nothing is known of an obstacle; no contact was found
@@ -51,16 +65,20 @@ class Search(NamedTuple):
     Attributes:
         found: the candidates.
         chosen: (c,) those that go on, best first.
-        dropped: (c,) marks.
-        swings, entries: starts of either kind.
+        dropped, tried: (c,) marks.
+        swings, spread, entries: starts of each kind.
+        samples: configurations over the limits.
         scratch, work: of the steps and of the distances.
     """
 
     found: Candidates
     chosen: IntArray
     dropped: BoolArray
+    tried: BoolArray
     swings: Starts
+    spread: Starts
     entries: Starts
+    samples: Samples
     scratch: Scratch
     work: Work
 
@@ -82,13 +100,16 @@ class Memory(NamedTuple):
 def new_search(body: Body, remembered: int) -> Search:
     """A workspace for ``body`` and memories of ``remembered`` contacts an obstacle."""
     k, n = len(body.joint), len(body.chain.parent)
-    c = k + remembered + SWINGS + ENTRIES
+    c = k + remembered + SWINGS + SPREAD + ENTRIES
     return Search(
         found=new_candidates(c, n),
         chosen=np.zeros(c, dtype=np.int64),
         dropped=np.zeros(c, dtype=np.bool_),
+        tried=np.zeros(c, dtype=np.bool_),
         swings=new_starts(SWINGS, n),
+        spread=new_starts(SPREAD, n),
         entries=new_starts(ENTRIES, n),
+        samples=spread_samples(body),
         scratch=new_scratch(n),
         work=new_work(),
     )
@@ -105,7 +126,7 @@ def add_start(
 ) -> None:
     """Candidate c begins with piece k at x, joints that do not move the piece as in q."""
     joint = body.joint[k]
-    found.piece[c] = k
+    found.piece[c], found.curvature[c] = k, CURVATURE
     for j in range(q.shape[0]):
         inside = min(max(x[j], body.chain.lower[j]), body.chain.upper[j])
         found.x[c, j] = inside if body.chain.moves[j, joint] else q[j]
@@ -121,13 +142,15 @@ def nearest_contacts(
     memory: Memory,
     table: Table,
     centre: Vec,
+    size: float,
     sheets: int,
     search: Search,
 ) -> int:
     """The contacts with obstacle o nearest to q, which must be clear of it: nearest first in ``search.chosen``.
 
     At most ``sheets`` of them, told apart by :data:`DISTINCT`; the answer says how many. The first candidates of
-    ``search.found`` must be the pieces, in their order, evaluated at q. ``memory`` is used and renewed.
+    ``search.found`` must be the pieces, in their order, evaluated at q. ``memory`` is used and renewed; ``centre`` and
+    ``size`` are of a ball around the obstacle, or around what of it is near.
     """
     found, chosen = search.found, search.chosen
     count = body.joint.shape[0]
@@ -138,8 +161,11 @@ def nearest_contacts(
         count += 1
     if cold:
         forward(body, q, frames)
-        for i in range(swing_starts(body, q, frames, centre, search.swings)):
+        for i in range(swing_starts(body, q, frames, centre, size, search.swings)):
             add_start(body, q, parts, o, found, count, search.swings.piece[i], search.swings.x[i], search.work)
+            count += 1
+        for i in range(sample_starts(body, q, parts, o, search.samples, search.spread)):
+            add_start(body, q, parts, o, found, count, search.spread.piece[i], search.spread.x[i], search.work)
             count += 1
     for i in range(table_starts(body, q, table, centre, search.entries)):
         add_start(body, q, parts, o, found, count, search.entries.piece[i], search.entries.x[i], search.work)
@@ -147,25 +173,66 @@ def nearest_contacts(
 
     kept = choose(search, count, (COLD_KEPT if cold else WARM_KEPT) + sheets, ALIKE, True)
     for i in range(kept):
-        _improve(body, q, parts, o, search, chosen[i], 2)
-    _drop_others(search, count, kept)
+        _improve(body, q, parts, o, search, chosen[i], 2, CLOSE)
     kept = choose(search, count, SECOND_KEPT + sheets, ALIKE, True)
     for i in range(kept):
-        _improve(body, q, parts, o, search, chosen[i], 3)
-    _drop_others(search, count, kept)
-    kept = choose(search, count, sheets + SPARE, ALIKE, True)
-    for i in range(kept):
-        _finish(body, q, parts, o, search, chosen[i])
-    _drop_others(search, count, kept)
-    kept = choose(search, count, sheets + SPARE, ALIKE, True)
-    if cold and kept == 0:
-        for k in range(body.joint.shape[0]):
-            add_start(body, q, parts, o, found, k, k, q, search.work)
-            _finish(body, q, parts, o, search, k)
-        kept = choose(search, count, sheets + SPARE, ALIKE, True)
-    _remember(memory, o, search, kept)
-    _drop_others(search, count, kept)
+        _improve(body, q, parts, o, search, chosen[i], 3, CLOSE)
+    _finish_best(body, q, parts, o, search, count, sheets + SPARE, count if cold else sheets + SPARE + RETRIES)
+    _remember(memory, o, search, choose(search, count, sheets + SPARE, ALIKE, True))
     return choose(search, count, sheets, DISTINCT, False)
+
+
+@njit
+def _finish_best(
+    body: Body, q: Array, parts: Parts, o: int, search: Search, count: int, wanted: int, most: int
+) -> None:
+    """Finish candidates, the most promising first, until ``wanted`` are contacts or ``most`` have been tried.
+
+    All others, and those that turn out to be none, get an infinite cost.
+    """
+    found, tried = search.found, search.tried
+    tried[:] = False
+    contacts = 0
+    for _ in range(most):
+        if contacts == wanted:
+            break
+        best = -1
+        for c in range(count):
+            if not tried[c] and found.cost[c] < np.inf and (best < 0 or found.cost[c] < found.cost[best]):
+                best = c
+        if best < 0:
+            break
+        tried[best] = True
+        if _like_a_contact(search, count, best):
+            found.cost[best] = np.inf
+            continue
+        _finish(body, q, parts, o, search, best)
+        if found.cost[best] < np.inf:
+            contacts += 1
+    for c in range(count):
+        if not tried[c]:
+            found.cost[c] = np.inf
+
+
+@njit
+def _like_a_contact(search: Search, count: int, candidate: int) -> bool:
+    """Whether a candidate is near a finished one of the same piece, and so on its way to the same contact."""
+    found = search.found
+    for c in range(count):
+        if c == candidate or not search.tried[c] or not found.cost[c] < np.inf:
+            continue
+        if found.piece[c] == found.piece[candidate] and _apart2(found, c, candidate) < ALIKE * ALIKE:
+            return True
+    return False
+
+
+@njit
+def _apart2(found: Candidates, c: int, other: int) -> float:
+    """Squared distance of two candidates, rad²."""
+    distance2 = 0.0
+    for j in range(found.x.shape[1]):
+        distance2 += (found.x[c, j] - found.x[other, j]) ** 2
+    return distance2
 
 
 @njit
@@ -189,10 +256,7 @@ def choose(search: Search, count: int, most: int, gap: float, by_piece: bool) ->
             other = chosen[i]
             if by_piece and found.piece[other] != found.piece[best]:
                 continue
-            distance2 = 0.0
-            for j in range(found.x.shape[1]):
-                distance2 += (found.x[other, j] - found.x[best, j]) ** 2
-            alike = alike or distance2 < gap * gap
+            alike = alike or _apart2(found, other, best) < gap * gap
         if not alike:
             chosen[kept] = best
             kept += 1
@@ -202,22 +266,11 @@ def choose(search: Search, count: int, most: int, gap: float, by_piece: bool) ->
 
 
 @njit
-def _drop_others(search: Search, count: int, kept: int) -> None:
-    """Only the first ``kept`` of ``search.chosen`` stay candidates: the others get an infinite cost."""
-    for i in range(kept):
-        search.dropped[search.chosen[i]] = True
-    for c in range(count):
-        if not search.dropped[c]:
-            search.found.cost[c] = np.inf
-        search.dropped[c] = False
-
-
-@njit
-def _improve(body: Body, q: Array, parts: Parts, o: int, search: Search, c: int, steps: int) -> None:
-    """Up to ``steps`` steps of candidate c, until it has converged."""
+def _improve(body: Body, q: Array, parts: Parts, o: int, search: Search, c: int, steps: int, tolerance: float) -> None:
+    """Up to ``steps`` steps of candidate c, until its residual is below ``tolerance``, rad."""
     found = search.found
     for _ in range(steps):
-        if found.residual[c] < CONVERGED and abs(found.f[c]) < TOUCH:
+        if found.residual[c] < tolerance and abs(found.f[c]) < TOUCH:
             return
         advance(body, q, parts, o, found, c, search.scratch, search.work)
 
@@ -227,7 +280,7 @@ def _finish(body: Body, q: Array, parts: Parts, o: int, search: Search, c: int) 
     """Candidate c to convergence; its cost becomes its distance from q, infinite where it is no contact."""
     found = search.found
     for _ in range(2):
-        _improve(body, q, parts, o, search, c, LAST_STEPS)
+        _improve(body, q, parts, o, search, c, LAST_STEPS, CONVERGED)
         restore(body, q, parts, o, found, c, search.scratch, search.work)
         if not abs(found.f[c]) <= TOUCH:
             found.cost[c] = np.inf
@@ -252,12 +305,12 @@ def penetrating_piece(body: Body, parts: Parts, o: int, found: Candidates, c: in
         if k == found.piece[c]:
             continue
         r_a, t_a = piece_pose(body, frames, k)
-        for p in range(parts.first[o], parts.first[o + 1]):
-            r, t = relative_pose(r_a, t_a, parts, p)
-            if lower_bound(body, k, parts, p, r, t) >= -TOUCH:
-                continue
-            if piece_distance(body, frames, k, parts, p, ZERO, 0.0, work).d < -TOUCH:
-                return k
+        r, t = relative_pose(r_a, t_a, parts, parts.first[o])
+        for block in range(parts.first_block[o], parts.first_block[o + 1]):
+            if block_bound(body, k, parts, block, r, t) < -TOUCH:
+                _, contact = nearest_in_block(body, frames, k, parts, block, -1, NO_CONTACT, work)
+                if contact.d < -TOUCH:
+                    return k
     return -1
 
 

@@ -1,4 +1,7 @@
-"""Where the contact search starts: the configuration itself, swings of one joint, remembered contacts, a table.
+"""Where the contact search starts: q itself, swings of one joint, samples, remembered contacts, a table.
+
+Samples are configurations spread over the limits, with the pieces' placements at each: a bound of the gap tells at once
+which of them are near an obstacle.
 
 A table holds contact configurations for a ball at every point of a grid over the workspace, as starts only: what the
 search returns is refined on the real shapes. Every start is moved by whole turns of each revolute joint to come as near
@@ -13,12 +16,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cdfctl.fields.kernel.body import Body, Frames, piece_pose
+from cdfctl.fields.kernel.body import Body, Frames, forward, new_frames, piece_pose, store_rot
+from cdfctl.fields.kernel.distance import block_bound, relative_pose
 from cdfctl.fields.kernel.jit import njit
+from cdfctl.fields.kernel.parts import Parts
 from cdfctl.fields.kernel.projection import copy
-from cdfctl.fields.kernel.vec import Vec, add, along, cross, dot, norm, rotate, sub, vec, vec3
+from cdfctl.fields.kernel.vec import Vec, add, along, cross, dot, norm, rot, rotate, store, sub, vec, vec3
 from cdfctl.types import Array, IntArray
 
+SAMPLED_PIECES = 1200  # samples times pieces: about 30 µs to go through
+SPACING = 0.3  # rad between starts of one piece
 REACH = 0.5  # m/rad: how fast a piece moves, to weigh a gap in metres against an angle; only ranks starts
 
 
@@ -54,17 +61,83 @@ def empty_table(n: int) -> Table:
     )
 
 
+class Samples(NamedTuple):
+    """s configurations spread over the limits and where the k pieces are there.
+
+    Attributes:
+        q: (s, n).
+        rotation, translation: (s, k, 3, 3), (s, k, 3) the pieces' frames in the world.
+    """
+
+    q: Array
+    rotation: Array
+    translation: Array
+
+
+def spread_samples(body: Body) -> Samples:
+    """Samples on a Halton sequence; an infinite limit spreads over one turn, or one metre either way."""
+    from scipy.stats import qmc
+
+    n, k = len(body.chain.parent), len(body.joint)
+    half = np.where(body.chain.prismatic, 1.0, pi)
+    lower = np.where(np.isfinite(body.chain.lower), body.chain.lower, -half)
+    upper = np.where(np.isfinite(body.chain.upper), body.chain.upper, half)
+    s = -(-SAMPLED_PIECES // max(k, 1))
+    q = lower + qmc.Halton(n, scramble=False).random(s) * (upper - lower)
+    samples = Samples(q, np.zeros((s, k, 3, 3)), np.zeros((s, k, 3)))
+    place_samples(body, samples, new_frames(body))
+    return samples
+
+
+@njit
+def place_samples(body: Body, samples: Samples, frames: Frames) -> None:
+    """Fill in where the pieces are at every sample."""
+    for i in range(samples.q.shape[0]):
+        forward(body, samples.q[i], frames)
+        for k in range(body.joint.shape[0]):
+            r, t = piece_pose(body, frames, k)
+            store_rot(samples.rotation[i], k, r)
+            store(samples.translation[i], k, t)
+
+
+@njit
+def sample_starts(body: Body, q: Array, parts: Parts, o: int, samples: Samples, starts: Starts) -> int:
+    """The samples nearest to q and to contact with obstacle o; how many starts there are."""
+    chain = body.chain
+    count = 0
+    for i in range(samples.q.shape[0]):
+        for k in range(body.joint.shape[0]):
+            r_a, t_a = rot(samples.rotation[i], k), vec(samples.translation[i], k)
+            r, t = relative_pose(r_a, t_a, parts, parts.first[o])
+            gap = np.inf
+            for block in range(parts.first_block[o], parts.first_block[o + 1]):
+                gap = min(gap, block_bound(body, k, parts, block, r, t))
+            distance2 = 0.0
+            for j in range(q.shape[0]):
+                if chain.moves[j, body.joint[k]]:
+                    distance2 += (_turned(body, samples.q[i, j], j, q) - q[j]) ** 2
+            cost = sqrt(distance2) + max(0.0, gap) / REACH
+            if wanted(starts, count, cost):
+                for j in range(q.shape[0]):
+                    moved = chain.moves[j, body.joint[k]]
+                    starts.offer[j] = _turned(body, samples.q[i, j], j, q) if moved else q[j]
+                count = keep_offer(starts, count, k, cost)
+    return count
+
+
 class Starts(NamedTuple):
-    """Workspace: the best starts found so far: ``piece`` (s,), ``x`` (s, n), ``cost`` (s,), least first."""
+    """Workspace: the best starts found so far: ``piece`` (s,), ``x`` (s, n), ``cost`` (s,), least first; ``offer`` (n,)
+    is the one to be kept or not."""
 
     piece: IntArray
     x: Array
     cost: Array
+    offer: Array
 
 
 def new_starts(s: int, n: int) -> Starts:
     """Places for ``s`` starts."""
-    return Starts(np.zeros(s, dtype=np.int64), np.zeros((s, n)), np.zeros(s))
+    return Starts(np.zeros(s, dtype=np.int64), np.zeros((s, n)), np.zeros(s), np.zeros(n))
 
 
 @njit
@@ -79,26 +152,45 @@ def nearest_turn(value: float, target: float, lower: float, upper: float) -> flo
 
 
 @njit
-def keep_start(starts: Starts, count: int, cost: float) -> int:
-    """The place for a start of this cost among the ``count`` kept so far, others moved down; -1 if it is not kept."""
+def wanted(starts: Starts, count: int, cost: float) -> bool:
+    """Whether a start of this cost may be kept beside the ``count`` kept so far."""
     size: int = starts.cost.shape[0]
-    if count == size and not cost < starts.cost[size - 1]:
-        return -1
-    place = min(count, size - 1)
+    return count < size or cost < starts.cost[size - 1]
+
+
+@njit
+def keep_offer(starts: Starts, count: int, piece: int, cost: float) -> int:
+    """Keep ``starts.offer`` among the ``count`` kept so far; how many there are then.
+
+    Of starts of one piece within :data:`SPACING` of each other only the cheapest stays.
+    """
+    place = min(count, starts.cost.shape[0] - 1)  # the one that gives way
+    for i in range(count):
+        if starts.piece[i] == piece:
+            distance2 = 0.0
+            for j in range(starts.offer.shape[0]):
+                distance2 += (starts.x[i, j] - starts.offer[j]) ** 2
+            if distance2 < SPACING * SPACING:
+                if starts.cost[i] <= cost:
+                    return count
+                place = i
+                break
+    grown = max(count, place + 1)
     while place > 0 and starts.cost[place - 1] > cost:
         starts.cost[place], starts.piece[place] = starts.cost[place - 1], starts.piece[place - 1]
         copy(starts.x[place - 1], starts.x[place])
         place -= 1
-    starts.cost[place] = cost
-    return place
+    starts.cost[place], starts.piece[place] = cost, piece
+    copy(starts.offer, starts.x[place])
+    return grown
 
 
 @njit
-def swing_starts(body: Body, q: Array, frames: Frames, p: Vec, starts: Starts) -> int:
-    """Turns of one joint that bring the middle of a piece nearest to the point ``p``; how many starts there are.
+def swing_starts(body: Body, q: Array, frames: Frames, p: Vec, size: float, starts: Starts) -> int:
+    """Turns of one joint that bring the middle of a piece up to a ball of radius ``size`` around ``p``; how many.
 
     A turn of joint j carries the middle c of a piece around the joint's axis; it is nearest to p where both lie in one
-    half-plane through the axis. All joints must have been placed at q.
+    half-plane through the axis, and meets the ball a little before. All joints must have been placed at q.
     """
     chain = body.chain
     count = 0
@@ -115,16 +207,18 @@ def swing_starts(body: Body, q: Array, frames: Frames, p: Vec, starts: Starts) -
             radius_c, radius_p = norm(across_c), norm(across_p)
             if radius_c < 0.02 or radius_p < 0.02:
                 continue
-            turn = atan2(dot(z, cross(across_c, across_p)), dot(across_c, across_p))
+            whole = atan2(dot(z, cross(across_c, across_p)), dot(across_c, across_p))
+            before = min(abs(whole), size / radius_p)
+            turn = whole - before if whole > 0.0 else whole + before
             x_j = nearest_turn(q[j] + turn, q[j], chain.lower[j], chain.upper[j])
-            missing = abs(x_j - q[j] - turn) * radius_c
+            short = x_j - q[j] - turn  # of the turn, but for whole ones
+            missing = abs(short - 2.0 * pi * floor(short / (2.0 * pi) + 0.5)) * radius_c
             gap = sqrt((radius_c - radius_p) ** 2 + (height_c - height_p) ** 2) + missing
-            place = keep_start(starts, count, abs(x_j - q[j]) + gap / REACH)
-            if place >= 0:
-                count = min(count + 1, starts.cost.shape[0])
-                starts.piece[place] = k
-                copy(q, starts.x[place])
-                starts.x[place, j] = x_j
+            cost = abs(x_j - q[j]) + gap / REACH
+            if wanted(starts, count, cost):
+                copy(q, starts.offer)
+                starts.offer[j] = x_j
+                count = keep_offer(starts, count, k, cost)
     return count
 
 
@@ -147,20 +241,18 @@ def table_starts(body: Body, q: Array, table: Table, p: Vec, starts: Starts) -> 
         distance2 = 0.0
         for j in range(n):
             if chain.moves[j, joint]:
-                distance2 += (_turned(body, table, e, j, q) - q[j]) ** 2
-        place = keep_start(starts, count, sqrt(distance2))
-        if place >= 0:
-            count = min(count + 1, starts.cost.shape[0])
-            starts.piece[place] = table.piece[e]
+                distance2 += (_turned(body, table.q[e, j], j, q) - q[j]) ** 2
+        if wanted(starts, count, sqrt(distance2)):
             for j in range(n):
-                starts.x[place, j] = _turned(body, table, e, j, q) if chain.moves[j, joint] else q[j]
+                starts.offer[j] = _turned(body, table.q[e, j], j, q) if chain.moves[j, joint] else q[j]
+            count = keep_offer(starts, count, table.piece[e], sqrt(distance2))
     return count
 
 
 @njit
-def _turned(body: Body, table: Table, e: int, j: int, q: Array) -> float:
+def _turned(body: Body, value: float, j: int, q: Array) -> float:
+    """``value`` of joint j moved by whole turns to come near to q, within the limits."""
     chain = body.chain
-    value: float = table.q[e, j]
     lower: float = chain.lower[j]
     upper: float = chain.upper[j]
     if chain.prismatic[j]:
