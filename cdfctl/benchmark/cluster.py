@@ -8,7 +8,7 @@ from typing import Any
 
 from cdfctl.errors import InputError, MissingError
 
-PATIENCE = 10.0
+PATIENCE = 5.0
 """Seconds to wait for a scheduler, and for its first worker."""
 
 
