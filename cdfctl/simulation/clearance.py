@@ -153,6 +153,6 @@ def _sphere(geometry: Any) -> Array:
         return np.array([0.0, 0.0, 0.0, np.hypot(geometry.radius, geometry.halfLength)])
     if isinstance(geometry, coal.Box):
         return np.array([0.0, 0.0, 0.0, np.linalg.norm(geometry.halfSide)])
-    points = np.array(geometry.points() if isinstance(geometry, coal.Convex) else geometry.vertices())
+    points = np.array(geometry.points() if isinstance(geometry, coal.Convex) else geometry.vertices()).reshape(-1, 3)
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     return np.append(centre, np.linalg.norm(points - centre, axis=1).max())

@@ -52,3 +52,9 @@ def test_depth_of_a_segment_in_a_cylinder(depth):
 
 def test_an_empty_scene_has_no_nearest():
     assert nearest(load_robot("planar"), np.zeros(2), Scene()) is None
+
+
+def test_a_cloud_of_one_point():
+    found = nearest(load_robot("planar"), np.zeros(2), Scene([Obstacle(PointCloud([[0, 0, 0]], 0.1), [1.0, 0.5, 0.0])]))
+    assert found is not None
+    assert found.distance == pytest.approx(0.4, abs=1e-6)
