@@ -15,11 +15,10 @@ from cdfctl.robots.robot import Robot, load_robot
 from cdfctl.scenario.schema import HoldTask, JointGoalTask, ReachTask, RobotConfig, Scenario
 from cdfctl.scenario.shapes import Body
 from cdfctl.scenario.values import Complaint
-from cdfctl.simulation.clearance import nearest
+from cdfctl.simulation.clearance import nearest_each
 from cdfctl.simulation.judge import CONTACT
 from cdfctl.simulation.motion import SceneMotion
 from cdfctl.simulation.shapes import shape_of, vector_of
-from cdfctl.types import Scene
 
 Place = tuple[str | int, ...]
 
@@ -136,13 +135,9 @@ def _shapes(scenario: Scenario) -> Iterator[Complaint]:
 
 def _start_in_contact(scenario: Scenario, robot: Robot) -> Iterator[Complaint]:
     """The judge's own distance at t = 0, each obstacle by itself, so that all of them are named."""
-    q0, scene = vector_of(scenario.robot.q0), SceneMotion(scenario.obstacles).at(0.0)
-    for i in range(len(scene)):
-        one = Scene.from_arrays(
-            scene.shapes[i : i + 1], scene.names[i : i + 1], scene.poses[i : i + 1], scene.twists[i : i + 1]
-        )
-        found = nearest(robot, q0, one)
-        if found is not None and found.distance <= CONTACT:
+    scene = SceneMotion(scenario.obstacles).at(0.0)
+    for i, found in enumerate(nearest_each(robot, vector_of(scenario.robot.q0), scene)):
+        if found.distance <= CONTACT:
             depth = f"{1e3 * abs(found.distance):.1f} mm deep" if found.distance < 0.0 else "touching"
             message = f"at the start '{found.obstacle}' is in contact with {found.link} ({depth})"
             place: Place = (

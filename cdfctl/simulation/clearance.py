@@ -114,14 +114,21 @@ class Clearance:
 
 def nearest(robot: Robot, q: Array, scene: Scene) -> Nearest | None:
     """The least signed distance of ``robot`` at ``q`` to the obstacles of ``scene``; None for an empty scene."""
-    if len(scene) == 0:
-        return None
+    return min(nearest_each(robot, q, scene), key=lambda found: found.distance, default=None)
+
+
+def nearest_each(robot: Robot, q: Array, scene: Scene) -> list[Nearest]:
+    """The least signed distance of ``robot`` at ``q`` (n,) to each obstacle of ``scene``; empty where the robot has no
+    geometry."""
     clearance = Clearance(robot, scene.shapes)
+    if not len(scene) or not clearance.objects:
+        return []
     clearance.place(np.asarray(q, dtype=np.float64), scene.poses)
-    distances = clearance.distances()
-    pair = int(np.argmin(distances))
-    m = len(scene)
-    return Nearest(float(distances[pair]), robot.geometry_links[pair // m], scene.names[pair % m])
+    distances = clearance.distances().reshape(clearance.objects, len(scene))
+    links = distances.argmin(axis=0)
+    return [
+        Nearest(float(distances[link, i]), robot.geometry_links[link], scene.names[i]) for i, link in enumerate(links)
+    ]
 
 
 def _exact(request: Any) -> Any:

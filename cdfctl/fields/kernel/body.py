@@ -9,6 +9,7 @@ of a body the joint moves, the joint's column of the Jacobian at p is
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import cos, sin
 from typing import NamedTuple
 
@@ -55,8 +56,9 @@ class Frames(NamedTuple):
     axis: Array
 
 
+@lru_cache(maxsize=8)
 def body_of(robot: Robot) -> Body:
-    """The arrays of ``robot``."""
+    """The arrays of ``robot``, which nothing may write to: packing its hulls takes as long as some runs."""
     pieces = sorted(robot.pieces, key=lambda piece: piece.link)
     k = len(pieces)
     link = np.array([p.link for p in pieces], dtype=np.int64)
