@@ -160,6 +160,11 @@ def _sphere(geometry: Any) -> Array:
         return np.array([0.0, 0.0, 0.0, np.hypot(geometry.radius, geometry.halfLength)])
     if isinstance(geometry, coal.Box):
         return np.array([0.0, 0.0, 0.0, np.linalg.norm(geometry.halfSide)])
-    points = np.array(geometry.points() if isinstance(geometry, coal.Convex) else geometry.vertices()).reshape(-1, 3)
+    if isinstance(geometry, coal.Convex):
+        points = np.array(geometry.points())
+    elif geometry.num_vertices == 1:
+        points = np.array([geometry.vertex(0)])  # vertices() hands a single one back as memory of something else
+    else:
+        points = np.array(geometry.vertices())
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     return np.append(centre, np.linalg.norm(points - centre, axis=1).max())
