@@ -13,6 +13,7 @@ from rich.console import RenderableType
 from cdfctl.control.safety_filter import SafetyFilter
 from cdfctl.report.tables import listing
 from cdfctl.robots.robot import load_robot
+from cdfctl.scenario.variants import DEFAULT_VARIANT
 from cdfctl.types import Scene, Sphere
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ class Timing:
         }
 
 
-def measure(variant: str = "sdf-tvcbf-qp") -> list[Timing]:
+def measure(variant: str = DEFAULT_VARIANT) -> list[Timing]:
     """Time :meth:`SafetyFilter.step` for 6 and 50 balls on a Franka, without the first steps, which compile."""
     robot = load_robot("franka")
     return [_measure(robot, variant, balls) for balls in BALLS]

@@ -166,7 +166,7 @@ VARIANTS: Mapping[str, Variant] = MappingProxyType(
     }
 )
 
-DEFAULT_VARIANT = "sdf-tvcbf-qp"
+DEFAULT_VARIANT = "dual-tvcbf-qp"
 
 TASKS_OF: Mapping[TaskKind, tuple[str, ...]] = MappingProxyType(
     {"joint-goal": ("joint-goal", "hold"), "tvclf": ("reach",)}

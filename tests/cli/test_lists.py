@@ -100,5 +100,5 @@ def test_doctor_times_the_control_step(cli, monkeypatch):
     assert all(0.0 < timing["step_ms"]["p50"] <= timing["step_ms"]["p99"] for timing in document["speed"])
     shown = cli("doctor", "--speed")
     assert shown.status == 0
-    assert "sdf-tvcbf-qp  " in shown.out
+    assert "dual-tvcbf-qp  " in shown.out
     assert " ms" in shown.out

@@ -42,7 +42,7 @@ def test_shipped_scenarios(name):
     assert scenario.name == name
     assert scenario.source
     assert scenario.assumptions
-    assert scenario.controller.variant == ("cdf-tvcbf-tvclf-qp" if name.startswith("reach") else "sdf-tvcbf-qp")
+    assert scenario.controller.variant == ("cdf-tvcbf-tvclf-qp" if name.startswith("reach") else "dual-tvcbf-qp")
     check_runnable(scenario)
     assert scenario.robot.limits.velocity == 2.0
     assert (scenario.simulation.dt, scenario.simulation.time_limit) == (0.1, 20.0)
@@ -107,8 +107,9 @@ def test_franka_benchmarks_against_the_paper():
 def test_resolve_writes_every_default():
     resolved = resolve(load_scenario("C1").scenario).controller
     assert all(getattr(resolved, name) is not None for name in type(resolved).model_fields)
-    assert (resolved.alpha, resolved.margin, resolved.limit_alpha, resolved.slack_weight) == (1.0, 0.05, 3.0, 100.0)
-    assert (resolved.on_infeasible, resolved.links, resolved.solver) == ("least-violation", "nearest", "daqp")
+    assert (resolved.alpha, resolved.margin, resolved.limit_alpha, resolved.slack_weight) == (3.0, 0.05, 3.0, 100.0)
+    assert (resolved.on_infeasible, resolved.links, resolved.sheets) == ("least-violation", "all", 4)
+    assert resolved.solver == "daqp"
 
 
 def test_reach_is_valid_but_cannot_run_without_a_controller_for_it(monkeypatch):
