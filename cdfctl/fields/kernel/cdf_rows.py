@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cdfctl.fields.kernel.body import Body
+from cdfctl.fields.kernel.contact import AT_LIMIT
 from cdfctl.fields.kernel.escape import Escape, escape_from, new_escape
 from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.parts import Parts, obstacle_pose, time_derivative
@@ -120,7 +121,7 @@ def _fill(body: Body, q: Array, parts: Parts, o: int, search: Search, c: int, ro
     for j in range(q.shape[0]):
         D2 += (q[j] - x[j]) ** 2
         whole2 += g[j] * g[j]
-        if lower[j] < x[j] < upper[j]:
+        if lower[j] + AT_LIMIT < x[j] < upper[j] - AT_LIMIT:
             free2 += (q[j] - x[j]) ** 2
             g2 += g[j] * g[j]
     D = sqrt(D2)

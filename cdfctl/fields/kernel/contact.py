@@ -38,6 +38,7 @@ LONGEST_STEP = 0.35  # rad
 CURVATURE = 20.0  # σ to begin with, 1/m: of a surface of 5 cm radius; half and twice as much cost a fifth more steps
 GREATEST_CURVATURE = 60.0  # 1/m
 LOCAL = 0.2  # rad: the residual below which a secant says something of the curvature at the contact
+AT_LIMIT = 1e-6  # rad: a joint nearer than this to a limit is at it
 STILL = 1e-9  # m/rad: no joint moves the contact
 
 
@@ -142,7 +143,7 @@ def measure(body: Body, q: Array, found: Candidates, c: int) -> None:
     gg, gx, distance2 = 0.0, 0.0, 0.0
     for j in range(x.shape[0]):
         distance2 += (x[j] - q[j]) ** 2
-        if lower[j] < x[j] < upper[j]:
+        if lower[j] + AT_LIMIT < x[j] < upper[j] - AT_LIMIT:
             gg += g[j] * g[j]
             gx += g[j] * (x[j] - q[j])
     slope = sqrt(gg)
@@ -150,9 +151,9 @@ def measure(body: Body, q: Array, found: Candidates, c: int) -> None:
     residual2 = 0.0
     for j in range(x.shape[0]):
         z = x[j] - q[j] + multiplier * g[j]
-        if x[j] <= lower[j]:
+        if x[j] <= lower[j] + AT_LIMIT:
             z = min(z, 0.0)  # at a limit only a pull back inside counts
-        elif x[j] >= upper[j]:
+        elif x[j] >= upper[j] - AT_LIMIT:
             z = max(z, 0.0)
         found.z[c, j] = z
         residual2 += z * z
@@ -182,7 +183,11 @@ def advance(
         length2 += y[j] * y[j]
     share = min(1.0, longest / sqrt(length2)) if length2 > 0.0 else 0.0
     for j in range(y.shape[0]):
-        moved = min(max(x[j] + share * y[j], lower[j]), upper[j])
+        moved = x[j] + share * y[j]
+        if moved < lower[j] + AT_LIMIT:
+            moved = lower[j]
+        elif moved > upper[j] - AT_LIMIT:
+            moved = upper[j]
         y[j] = moved - x[j]
         x[j] = moved
     multiplier, residual = found.multiplier[c], found.residual[c]
@@ -250,11 +255,15 @@ def hessian(body: Body, found: Candidates, c: int, scratch: Scratch) -> None:
 def restore(
     body: Body, q: Array, parts: Parts, o: int, found: Candidates, c: int, scratch: Scratch, work: Work
 ) -> None:
-    """Bring candidate c onto the surface: up to four projections, until |f| is under 1e-9 m."""
-    y = scratch.y
+    """Bring candidate c onto the surface: up to four projections, until |f| is under 1e-9 m. Joints at limits stay."""
+    lower, upper = body.chain.lower, body.chain.upper
+    x, y, g = found.x[c], scratch.y, scratch.z
     for _ in range(4):
         if abs(found.f[c]) < 1e-9 or not found.slope[c] > STILL:
             return
-        project(found.x[c], found.x[c], found.f[c], found.g[c], body.chain.lower, body.chain.upper, y)
-        copy(y, found.x[c])
+        for j in range(g.shape[0]):
+            free = lower[j] + AT_LIMIT < x[j] < upper[j] - AT_LIMIT
+            g[j] = found.g[c, j] if free else 0.0
+        project(x, x, found.f[c], g, lower, upper, y)
+        copy(y, x)
         evaluate(body, q, parts, o, found, c, work)
