@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from cdfctl.benchmark.sweep import Setting, label
+from cdfctl.benchmark.tables import table_mark
 from cdfctl.errors import InputError
 from cdfctl.robots.robot import Robot
 from cdfctl.scenario.library import load_scenario
@@ -37,11 +38,13 @@ class Cell:
         scenario: resolved, with its draws still in it; ``seed`` is the benchmark's.
         settings: what a sweep set in it.
         shipped: it is a shipped scenario as it stands, so the paper's figures may stand beside it.
+        table: mark of the contact table it uses (see :mod:`cdfctl.benchmark.tables`).
     """
 
     scenario: Scenario
     settings: tuple[Setting, ...] = ()
     shipped: bool = False
+    table: str | None = None
 
     @property
     def name(self) -> str:
@@ -103,6 +106,7 @@ class Plan:
                     "scenario": cell.scenario.model_dump(mode="json", exclude_none=True),
                     "robot": self.robots[robot_key(cell.scenario)],
                     "files": _files(cell.scenario),
+                    "table": cell.table,
                 }
                 for cell in self.cells
             ],
@@ -149,7 +153,7 @@ def make_plan(
                 wired = assemble(file, robot=robots.get(place))
                 robots[place] = wired.robot
                 as_shipped = "/" not in source and not Path(source).suffix and not settings and not overrides
-                cell = Cell(resolve(file.scenario), settings, as_shipped)
+                cell = Cell(resolve(file.scenario), settings, as_shipped, table_mark(file.scenario, wired.robot))
                 same = cells.setdefault((cell.name, cell.controller, cell.on_infeasible), cell)
                 if same.scenario != cell.scenario:
                     raise InputError(f"two scenarios are called '{cell.name}'", "give one of them another name")

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from cdfctl.benchmark.plan import Cell, robot_for
+from cdfctl.benchmark.tables import check_table
 from cdfctl.errors import CdfctlError
 from cdfctl.robots.robot import Robot
 from cdfctl.scenario.draws import draw
@@ -32,12 +33,18 @@ class Answer:
 
 def run_trial(cell: Cell, trial: int, keep: Keep) -> Answer:
     """Run one trial of a cell to its end and judge it. A scenario that cannot be run, or a plant that fails, is a
-    result too: its outcome is ``error``."""
+    result too: its outcome is ``error``.
+
+    Raises:
+        MissingError: this process would use another contact table than the plan says.
+    """
     began = time.perf_counter()
     key = cell.key(trial)
+    robot = robot_for(cell.scenario, _ROBOTS)
+    check_table(cell.scenario, robot, cell.table)
     try:
         scenario = draw(cell.scenario, cell.scenario.seed, trial)
-        wired = assemble_scenario(scenario, trial=trial, robot=robot_for(scenario, _ROBOTS))
+        wired = assemble_scenario(scenario, trial=trial, robot=robot)
         for _ in wired.run():
             pass
         run = wired.result()

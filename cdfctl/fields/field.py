@@ -8,13 +8,17 @@ obstacle's motion adds.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from functools import lru_cache
+from typing import TYPE_CHECKING, Protocol
 
 from numpy.typing import ArrayLike
 
 from cdfctl.errors import unknown_name
 from cdfctl.robots.robot import Robot
 from cdfctl.types import FieldQuery, Scene, Unit
+
+if TYPE_CHECKING:
+    from cdfctl.fields.kernel.starts import Table
 
 
 class Field(Protocol):
@@ -54,10 +58,19 @@ def _sdf(robot: Robot) -> Field:
 
 
 def _cdf(robot: Robot) -> Field:
-    from cdfctl.fields.cdf import CDF
+    from cdfctl.fields.cdf import CDF, table_path
+
+    path = table_path(robot)
+    stamp = (path.stat().st_mtime_ns, path.stat().st_size) if path.exists() else None
+    return CDF(robot, _table(robot, stamp))
+
+
+@lru_cache(maxsize=4)
+def _table(robot: Robot, stamp: tuple[int, int] | None) -> Table | None:
+    """The robot's table of the user cache, read and checked once as long as its file keeps its ``stamp``."""
     from cdfctl.fields.table.store import cached_table
 
-    return CDF(robot, cached_table(robot))
+    return cached_table(robot)
 
 
 # A new field is one line here. Values import their module when called: the compiled kernels take a while to load.

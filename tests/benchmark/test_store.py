@@ -14,7 +14,7 @@ from cdfctl.benchmark.plan import Plan, make_plan
 from cdfctl.benchmark.run import Runner
 from cdfctl.benchmark.store import default_store, open_store, peek
 from cdfctl.benchmark.trial import Answer, run_trial
-from cdfctl.errors import InputError
+from cdfctl.errors import InputError, MissingError
 from cdfctl.simulation.run_folder import read_run
 
 
@@ -180,3 +180,14 @@ def test_a_trial_that_cannot_begin_is_an_error_with_its_reason(here: Path) -> No
     errors = [result for result in found if result.verdict.outcome == "error"]
     assert errors
     assert all("in contact" in (result.reason or "") for result in errors)
+
+
+def test_another_contact_table_is_another_benchmark(here: Path) -> None:
+    """The CDF's search starts from a table: one that a worker lacks must not pass unseen."""
+    plan = make_plan(["./small.yaml"], ["cdf-tvcbf-qp"], [], [()], trials=1, seed=0)
+    other = dataclasses.replace(plan, cells=(dataclasses.replace(plan.cells[0], table="0123456789ab"),))
+    assert default_store(other) != default_store(plan)
+    assert run_trial(plan.cells[0], 0, "none").result.verdict.outcome != "error"
+    with pytest.raises(MissingError, match="contact table of planar is not the one"):
+        run_trial(other.cells[0], 0, "none")
+    assert make_plan(["./small.yaml"], ["sdf-tvcbf-qp"], [], [()], trials=1, seed=0).cells[0].table is None
