@@ -185,12 +185,14 @@ def test_out_of_reach_is_infinite_and_invalid(planar) -> None:
 
 
 def test_sheets_are_distinct_contacts(planar) -> None:
-    answer = make_field("cdf", planar).contacts(np.array([1.2, 2.5]), ball((1.0, 2.5)), sheets=4)
+    """A ball straight behind the arm is reached either way round."""
+    answer = make_field("cdf", planar).contacts(np.array([0.05, 0.0]), ball((-2.5, 0.0)), sheets=4)
     assert len(answer.d) >= 2
     gaps = np.linalg.norm(answer.contact_q[:, None] - answer.contact_q[None], axis=-1)[
         np.triu_indices(len(answer.d), 1)
     ]
     assert np.all(gaps >= 0.1)
+    assert np.min(answer.contact_q[:, 0]) < 0.0 < np.max(answer.contact_q[:, 0])
 
 
 def test_both_links_in_penetration_are_both_clear_at_the_contact(planar) -> None:

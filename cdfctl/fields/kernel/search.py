@@ -50,7 +50,8 @@ WARM_KEPT = 4  # and with one
 SECOND_KEPT = 4  # of these, those that go on after two steps
 SPARE = 1  # contacts looked for beyond those asked for
 RETRIES = 2  # candidates that may turn out to be no contact, with a memory
-LAST_STEPS = 12
+COLD_STEPS = 30  # at most, to finish a contact, without a memory
+WARM_STEPS = 8  # and with one
 CLOSE = 5e-3  # rad: the residual at which a candidate's cost is good enough to compare
 CONVERGED = 1e-4  # rad: and at which a contact is done; its distance is right to the square of it
 ALIKE = 0.05  # rad: candidates of one piece nearer than this are one
@@ -177,14 +178,17 @@ def nearest_contacts(
     kept = choose(search, count, SECOND_KEPT + sheets, ALIKE, True)
     for i in range(kept):
         _improve(body, q, parts, o, search, chosen[i], 3, CLOSE)
-    _finish_best(body, q, parts, o, search, count, sheets + SPARE, count if cold else sheets + SPARE + RETRIES)
+    if cold:
+        _finish_best(body, q, parts, o, search, count, sheets + SPARE, count, COLD_STEPS)
+    else:
+        _finish_best(body, q, parts, o, search, count, sheets + SPARE, sheets + SPARE + RETRIES, WARM_STEPS)
     _remember(memory, o, search, choose(search, count, sheets + SPARE, ALIKE, True))
     return choose(search, count, sheets, DISTINCT, False)
 
 
 @njit
 def _finish_best(
-    body: Body, q: Array, parts: Parts, o: int, search: Search, count: int, wanted: int, most: int
+    body: Body, q: Array, parts: Parts, o: int, search: Search, count: int, wanted: int, most: int, steps: int
 ) -> None:
     """Finish candidates, the most promising first, until ``wanted`` are contacts or ``most`` have been tried.
 
@@ -206,7 +210,7 @@ def _finish_best(
         if _like_a_contact(search, count, best):
             found.cost[best] = np.inf
             continue
-        _finish(body, q, parts, o, search, best)
+        _finish(body, q, parts, o, search, best, steps)
         if found.cost[best] < np.inf:
             contacts += 1
     for c in range(count):
@@ -276,11 +280,14 @@ def _improve(body: Body, q: Array, parts: Parts, o: int, search: Search, c: int,
 
 
 @njit
-def _finish(body: Body, q: Array, parts: Parts, o: int, search: Search, c: int) -> None:
-    """Candidate c to convergence; its cost becomes its distance from q, infinite where it is no contact."""
+def _finish(body: Body, q: Array, parts: Parts, o: int, search: Search, c: int, steps: int) -> None:
+    """Candidate c to convergence, or for ``steps`` steps.
+
+    Its cost becomes its distance from q, infinite where it is no contact.
+    """
     found = search.found
     for _ in range(2):
-        _improve(body, q, parts, o, search, c, LAST_STEPS, CONVERGED)
+        _improve(body, q, parts, o, search, c, steps, CONVERGED)
         restore(body, q, parts, o, found, c, search.scratch, search.work)
         if not abs(found.f[c]) <= TOUCH:
             found.cost[c] = np.inf

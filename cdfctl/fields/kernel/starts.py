@@ -16,12 +16,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cdfctl.fields.kernel.body import Body, Frames, forward, new_frames, piece_pose, store_rot
+from cdfctl.fields.kernel.body import Body, Frames, forward, new_frames, piece_pose
 from cdfctl.fields.kernel.distance import block_bound, relative_pose
 from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.parts import Parts
 from cdfctl.fields.kernel.projection import copy
-from cdfctl.fields.kernel.vec import Vec, add, along, cross, dot, norm, rot, rotate, store, sub, vec, vec3
+from cdfctl.fields.kernel.vec import Vec, add, along, cross, dot, norm, rot, rotate, store, store_rot, sub, vec, vec3
 from cdfctl.types import Array, IntArray
 
 SAMPLED_PIECES = 1200  # samples times pieces: about 30 µs to go through
@@ -175,7 +175,7 @@ def keep_offer(starts: Starts, count: int, piece: int, cost: float) -> int:
                     return count
                 place = i
                 break
-    grown = max(count, place + 1)
+    grown: int = max(count, place + 1)
     while place > 0 and starts.cost[place - 1] > cost:
         starts.cost[place], starts.piece[place] = starts.cost[place - 1], starts.piece[place - 1]
         copy(starts.x[place - 1], starts.x[place])
