@@ -36,7 +36,7 @@ docs: $(STAMPS)/docs  ## the documentation, warnings as errors, into docs/_build
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
 
 clean:  ## remove the environment and everything built
-	rm -rf $(VENV) build dist docs/_build .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
+	rm -rf $(VENV) build dist docs/_build docs/_figures .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
 
 $(STAMPS)/venv:
 	@test -n "$(PYTHON)" || { echo "cdfctl needs Python 3.11 or newer with its venv module; set PYTHON=/path/to/python" >&2; exit 3; }

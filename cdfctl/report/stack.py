@@ -38,7 +38,7 @@ NEEDED: Mapping[str, str] = {
 }
 """Every package cdfctl needs, and the module whose import shows that it works."""
 
-OPTIONAL: Mapping[str, str] = {"torch": "building contact tables"}
+OPTIONAL: Mapping[str, str] = {"torch": "building contact tables", "matplotlib": "figures"}
 """Packages of the extras, and what they add. Their import is slow, so only their presence is looked at."""
 
 
