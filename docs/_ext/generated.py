@@ -1,6 +1,6 @@
 """Pages made from the code: a line ``<!-- generated: NAME -->`` is replaced by what :data:`MAKERS` gives for NAME.
 
-Nothing generated is committed, so nothing can lag behind the code.
+Figures are drawn into ``_figures`` first. Nothing generated is committed, so nothing can lag behind the code.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sphinx.application import Sphinx
@@ -113,7 +114,18 @@ def replace(app: Sphinx, docname: str, source: list[str]) -> None:
     source[0] = MARK.sub(lambda match: MAKERS[match[1]](), source[0])
 
 
+def draw(app: Sphinx) -> None:
+    """Draw the figures of the pages, before the pages are read."""
+    from cdfctl.report.figures import save_figure
+    from cdfctl.report.figures_levels import levels_figure
+
+    folder = Path(app.srcdir) / "_figures"
+    folder.mkdir(exist_ok=True)
+    save_figure(levels_figure(), folder / "levels.png")
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Called by Sphinx."""
+    app.connect("builder-inited", draw)
     app.connect("source-read", replace)
     return {"parallel_read_safe": True}
