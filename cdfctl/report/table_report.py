@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from cdfctl.fields.table.accuracy import NEAR, WayError
 from cdfctl.fields.table.store import StoredTable
 from cdfctl.report.tables import facts
 
@@ -24,14 +27,22 @@ def table_report(stored: StoredTable, size: int) -> RenderableType:
         ("residual", f"{residual.max:.1e} m at most, {residual.mean:.1e} m mean ({residual.entries} entries, by coal)"),
         ("coverage", f"{share} ({coverage.covered} of {coverage.reachable} held-out points in reach)"),
     ]
+    parts: list[RenderableType] = [facts(rows)]
+    near = f"errors, pairs within {NEAR:g} rad"
+    for title, ways in (("errors, all pairs", stored.accuracy.comparison), (near, stored.accuracy.near)):
+        parts += [Text(), _errors(title, ways)]
+    return Group(*parts)
+
+
+def _errors(title: str, ways: Sequence[WayError]) -> Table:
     comparison = Table(box=None, pad_edge=False, padding=(0, 3, 0, 0), header_style="bold")
-    comparison.add_column("against brute force")
+    comparison.add_column(title)
     for name in ("mean error", "95 %", "within 0.01 rad", "no answer"):
         comparison.add_column(name, justify="right")
-    for way in stored.accuracy.comparison:
+    for way in ways:
         within = f"{100.0 * way.within:.0f} %"
         comparison.add_row(way.way, radians(way.mean), radians(way.p95), within, f"{way.missed} of {way.pairs}")
-    return Group(facts(rows), Text(), comparison)
+    return comparison
 
 
 def radians(value: float | None) -> str:

@@ -37,6 +37,7 @@ FRESH = 160  # starts a piece of the contacts the truth is made of
 SHARES = 40  # cold queries for one truth
 LOOP, PERIOD = 10, 0.1  # steps, and s of a step, before a warm query
 SPEED, BALL_SPEED = 0.5, 0.5  # meanwhile: rad/s at most of a joint, m/s of the ball
+NEAR = 1.0  # rad: pairs nearer than this are also counted apart, since a controller acts on them
 WAYS = ("table alone", "cold, no table", "cold, table", "warm, no table", "warm, table")
 
 
@@ -73,11 +74,12 @@ class WayError:
 
 @dataclass(frozen=True)
 class Accuracy:
-    """The report of a table."""
+    """The report: ``comparison`` over all pairs, ``near`` over those whose true distance is below ``NEAR``."""
 
     residual: Residual
     coverage: Coverage
     comparison: tuple[WayError, ...]
+    near: tuple[WayError, ...]
 
     def document(self) -> dict[str, Any]:
         """The report as one JSON object."""
@@ -90,16 +92,16 @@ class Accuracy:
             Residual(**document["residual"]),
             Coverage(**document["coverage"]),
             tuple(WayError(**way) for way in document["comparison"]),
+            tuple(WayError(**way) for way in document["near"]),
         )
-
-    def of(self, way: str) -> WayError:
-        """The errors of one of ``WAYS``."""
-        return next(item for item in self.comparison if item.way == way)
 
 
 class Answers(NamedTuple):
-    """At one point: whether its cell has entries, the true distance, that of each of ``WAYS`` (inf: none)."""
+    """At one ``point`` (3,) and ``q`` (n,): whether the point's cell has entries, the true distance, and that of each
+    of ``WAYS``; inf for none."""
 
+    point: Array
+    q: Array
     covered: bool
     truth: float
     ways: tuple[float, ...]
@@ -150,10 +152,12 @@ def measure_accuracy(
         pool.shutdown(cancel_futures=True)
     pairs = [answers for answers in found if answers.truth < np.inf]
     errors = np.array([[abs(way - answers.truth) for way in answers.ways] for answers in pairs]).reshape(-1, len(WAYS))
+    near = np.array([answers.truth < NEAR for answers in pairs], dtype=np.bool_)
     return Accuracy(
         residual=_residual(robot, table, radius, seed),
         coverage=Coverage(points, len(found), sum(answers.covered for answers in found)),
         comparison=tuple(_way_error(way, errors[:, i]) for i, way in enumerate(WAYS)),
+        near=tuple(_way_error(way, errors[near, i]) for i, way in enumerate(WAYS)),
     )
 
 
@@ -237,7 +241,8 @@ class HeldOut:
             self._query(q, point, table, new_memory(1, 3, self._n))[0],
             *warm,
         )
-        return Answers(self._table_alone(q, point) < np.inf, min(*ways[1:], self._truth(q, point, fresh)), ways)
+        truth = min(*ways[1:], self._truth(q, point, fresh))
+        return Answers(point, q, self._table_alone(q, point) < np.inf, truth, ways)
 
     def _query(self, q: Array, point: Array, table: Table, memory: Memory) -> tuple[float, bool]:
         """The distance to the ball at ``point``, inf for none, and whether q is clear of it."""

@@ -29,7 +29,9 @@ from cdfctl.types import Array
 
 CHUNK = 64  # points: about half a second, the most that an interrupt loses
 MOST = 20  # entries a piece and point
-KEEP_CLEAR = False  # see "Contact tables" in the documentation: what it changes was measured
+# Entries at which another piece is in penetration stay: an entry is a start only, the search goes on with the piece
+# that touches, and without them (13 % of a Franka's) queries were measured to be no better.
+KEEP_CLEAR = False
 
 Device = Literal["numpy", "cpu", "cuda"]
 Progress = Callable[[int, int], None]

@@ -25,6 +25,7 @@ LANDED = 1e-5  # m: greatest |f| of an entry as it is found; single precision, a
 STEPS = 8  # of restoration
 LONGEST = 1.0  # rad, of one step
 CROWD = 4  # contacts found, for each that is kept, after which no more starts are tried
+ALIKE = 0.02  # rad: of contacts nearer than this to each other one is kept
 HOPELESS = 3  # the share, one in so many, of all starts without a contact after which a piece is given up
 
 
@@ -83,7 +84,7 @@ def land(body: Body, k: int, start: Array, tools: Tools) -> bool:
     x, g = found.x[0], found.g[0]
     found.piece[0] = k
     for j in range(x.shape[0]):
-        x[j] = start[j] if chain.moves[j, body.joint[k]] else 0.0
+        x[j] = start[j] if chain.moves[j, body.joint[k]] else min(max(0.0, chain.lower[j]), chain.upper[j])
     evaluate(body, x, tools.parts, 0, found, 0, tools.work)
     for _ in range(STEPS):
         f = found.f[0]
@@ -130,8 +131,10 @@ def spread(body: Body, k: int, landed: int, tools: Tools, kept: Array) -> int:
         for s in range(1, landed):
             if gap[s] > gap[farthest]:
                 farthest = s
+        if gap[farthest] < ALIKE * ALIKE:
+            return i
         for j in range(pool.shape[1]):
-            turned = pool[farthest, j]
+            turned = pool[farthest, j] if chain.moves[j, body.joint[k]] else 0.0
             if chain.continuous[j]:
                 turned -= 2.0 * pi * floor(turned / (2.0 * pi) + 0.5)
             kept[i, j] = turned

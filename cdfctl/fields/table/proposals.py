@@ -109,7 +109,7 @@ class Proposer:
         return rotation, translation, axes, origins
 
     def _turn(self, axis: Array, angle: Any) -> Any:
-        cross = self._tensor(np.cross(np.eye(3), axis).T)
+        cross = self._tensor(np.cross(np.eye(3), axis))
         sine, cosine = angle.sin()[:, None, None], angle.cos()[:, None, None]
         return self._torch.eye(3, **self._like) + sine * cross + (1.0 - cosine) * (cross @ cross)
 
