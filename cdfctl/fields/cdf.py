@@ -106,8 +106,9 @@ class CDF:
             self._memory = new_memory(len(names), old.piece.shape[1], self.robot.n)
             for i, name in enumerate(names):
                 if name in places:
-                    for new_array, old_array in zip(self._memory, old, strict=True):
+                    for new_array, old_array in zip(self._memory[:-1], old[:-1], strict=True):
                         new_array[i] = old_array[places[name]]
+            self._memory.turn[:] = old.turn
         self._names = names
         return self._memory
 

@@ -81,6 +81,7 @@ def contact_rows(
     body: Body, q: Array, parts: Parts, memory: Memory, table: Table, sheets: int, rows: ContactRows, work: Workspace
 ) -> None:
     """Fill ``rows`` for all obstacles at q (n,)."""
+    memory.turn[0] += 1
     found = work.search.found
     pieces = body.joint.shape[0]
     for o in range(parts.first.shape[0] - 1):

@@ -46,8 +46,10 @@ SWINGS = 8  # one-joint turns kept as starts
 SPREAD = 12  # samples kept as starts
 ENTRIES = 8  # table entries kept as starts
 COLD_KEPT = 16  # starts that are followed, beyond the contacts asked for, without a memory
-WARM_KEPT = 4  # and with one
-SECOND_KEPT = 4  # of these, those that go on after two steps
+WARM_KEPT = 2  # and with one
+WIDE_KEPT = 5  # with one, in the obstacle's turn to be searched widely again
+COLD_SECOND = 4  # of these, those that go on after two steps
+WARM_SECOND = 1
 SPARE = 1  # contacts looked for beyond those asked for
 RETRIES = 2  # candidates that may turn out to be no contact, with a memory
 COLD_STEPS = 30  # at most, to finish a contact, without a memory
@@ -91,11 +93,14 @@ class Memory(NamedTuple):
         known: (m,) how many; 0 where nothing is known yet, -1 where the last query found no contact.
         piece: (m, w).
         x: (m, w, n).
+        turn: (1,) counts the queries: obstacle ``turn % m`` is searched as widely as at first, so that a contact that
+            has become the nearest since is found before long.
     """
 
     known: IntArray
     piece: IntArray
     x: Array
+    turn: IntArray
 
 
 def new_search(body: Body, remembered: int) -> Search:
@@ -118,7 +123,9 @@ def new_search(body: Body, remembered: int) -> Search:
 
 def new_memory(m: int, w: int, n: int) -> Memory:
     """An empty memory for m obstacles."""
-    return Memory(np.zeros(m, dtype=np.int64), np.zeros((m, w), dtype=np.int64), np.zeros((m, w, n)))
+    return Memory(
+        np.zeros(m, dtype=np.int64), np.zeros((m, w), dtype=np.int64), np.zeros((m, w, n)), np.zeros(1, dtype=np.int64)
+    )
 
 
 @njit
@@ -157,10 +164,11 @@ def nearest_contacts(
     count = body.joint.shape[0]
     frames = frames_of(found, 0)
     warm, cold = max(0, memory.known[o]), memory.known[o] == UNKNOWN
+    wide = cold or memory.turn[0] % memory.known.shape[0] == o
     for i in range(warm):
         add_start(body, q, parts, o, found, count, memory.piece[o, i], memory.x[o, i], search.work)
         count += 1
-    if cold:
+    if wide:
         forward(body, q, frames)
         for i in range(swing_starts(body, q, frames, centre, size, search.swings)):
             add_start(body, q, parts, o, found, count, search.swings.piece[i], search.swings.x[i], search.work)
@@ -172,10 +180,10 @@ def nearest_contacts(
         add_start(body, q, parts, o, found, count, search.entries.piece[i], search.entries.x[i], search.work)
         count += 1
 
-    kept = choose(search, count, (COLD_KEPT if cold else WARM_KEPT) + sheets, ALIKE, True)
+    kept = choose(search, count, (COLD_KEPT if cold else WIDE_KEPT if wide else WARM_KEPT) + sheets, ALIKE, True)
     for i in range(kept):
         _improve(body, q, parts, o, search, chosen[i], 2, CLOSE)
-    kept = choose(search, count, SECOND_KEPT + sheets, ALIKE, True)
+    kept = choose(search, count, (COLD_SECOND if cold else WARM_SECOND) + sheets, ALIKE, True)
     for i in range(kept):
         _improve(body, q, parts, o, search, chosen[i], 3, CLOSE)
     if cold:
