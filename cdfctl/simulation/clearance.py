@@ -90,6 +90,10 @@ class Clearance:
     def _value(self, pair: int, result: Any) -> float:
         cloud = self._clouds.get(pair % self.obstacles)
         d = float(result.min_distance)
+        if d < 0.0:
+            # Deep inside, coal's EPA may give up and say -1.8e308. The balls around two bodies come apart after a way
+            # of both radii at most, so no depth is greater.
+            d = max(d, -float(self.robot_spheres[pair // self.obstacles, 3] + self.reach[pair % self.obstacles]))
         if cloud is None:
             return d
         # coal's search over a tree stops at the first point inside, not at the deepest
