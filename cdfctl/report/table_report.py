@@ -28,7 +28,7 @@ def table_report(stored: StoredTable, size: int) -> RenderableType:
         ("coverage", f"{share} ({coverage.covered} of {coverage.reachable} held-out points in reach)"),
     ]
     parts: list[RenderableType] = [facts(rows)]
-    near = f"errors, pairs within {NEAR:g} rad"
+    near = f"errors, d < {NEAR:g} rad"
     for title, ways in (("errors, all pairs", stored.accuracy.comparison), (near, stored.accuracy.near)):
         parts += [Text(), _errors(title, ways)]
     return Group(*parts)
@@ -36,7 +36,7 @@ def table_report(stored: StoredTable, size: int) -> RenderableType:
 
 def _errors(title: str, ways: Sequence[WayError]) -> Table:
     comparison = Table(box=None, pad_edge=False, padding=(0, 3, 0, 0), header_style="bold")
-    comparison.add_column(title)
+    comparison.add_column(title, no_wrap=True)
     for name in ("mean error", "95 %", "within 0.01 rad", "no answer"):
         comparison.add_column(name, justify="right")
     for way in ways:
