@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import signal
 import sys
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from types import FrameType
 from typing import TYPE_CHECKING
 
 from cdfctl.cli import options
@@ -34,10 +37,14 @@ def run(
     file = load_scenario(scenario, options.overrides(settings, controller, seed))
 
     # The heavy imports, once the file is known to be good.
+    from cdfctl.fields.table.store import run_hint
+    from cdfctl.scenario.variants import VARIANTS
     from cdfctl.simulation.assemble import assemble
     from cdfctl.simulation.run_folder import check_target, default_folder, write_run
 
     wired = assemble(file, trial=trial)
+    if VARIANTS[wired.scenario.controller.variant].field != "sdf" and (hint := run_hint(wired.robot)):
+        note(hint, quiet=quiet)
     folder = out if out is not None else default_folder(wired.scenario, trial)
     check_target(folder)
     finished = follow(wired, quiet=quiet)
@@ -61,11 +68,9 @@ def run(
 def follow(wired: Trial, *, quiet: bool) -> bool:
     """Run to the end, with a progress bar where standard error is a terminal; False if interrupted on the way."""
     steps = wired.run()
-    with suppress(KeyboardInterrupt):
+    with suppress(KeyboardInterrupt), interrupts() as interrupted:
         if quiet or not sys.stderr.isatty():
-            for _ in steps:
-                pass
-            return True
+            return all(not interrupted() for _ in steps)
         from rich.progress import BarColumn, Progress, TextColumn
 
         columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[clock]}"))
@@ -73,11 +78,33 @@ def follow(wired: Trial, *, quiet: bool) -> bool:
             # The first step of a first run waits for the compiler.
             bar = progress.add_task("preparing (a first run compiles)", total=wired.rollout.max_steps, clock="")
             for step in steps:
+                if interrupted():
+                    return False
                 clock = f"{step.state.t:.1f} of at most {wired.scenario.simulation.time_limit:g} s"
                 progress.update(bar, description=wired.scenario.name, completed=step.index + 1, clock=clock)
             progress.update(bar, description="judging", clock="")
         return True
     return False
+
+
+@contextmanager
+def interrupts() -> Iterator[Callable[[], bool]]:
+    """Whether Ctrl-C has been pressed, to be asked between steps.
+
+    It raises KeyboardInterrupt too, as usual; but that is lost where it strikes while compiled code is being called.
+    """
+    pressed = False
+
+    def press(number: int, frame: FrameType | None) -> None:
+        nonlocal pressed
+        pressed = True
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, press)
+    try:
+        yield lambda: pressed
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def status_of(result: RunResult) -> int:
