@@ -138,7 +138,7 @@ def test_derivatives_of_every_shape_are_finite_differences(name) -> None:
 
         field.reset()
         answer = field.query(q, scene_at(0.0))
-        if not answer.valid[0] or abs(answer.d[0]) < 0.02:
+        if not answer.valid[0] or not 0.02 < abs(answer.d[0]) < math.inf:
             continue
 
         def numeric(step, q=q, scene_at=scene_at):
@@ -147,8 +147,9 @@ def test_derivatives_of_every_shape_are_finite_differences(name) -> None:
                      for e in np.eye(robot.n)]  # fmt: skip
             return np.array([(plus - minus) / (2.0 * step) for plus, minus in moved] + [rate])
 
-        fine, coarse = numeric(step), numeric(3.0 * step)
-        if np.linalg.norm(fine - coarse) > 0.02 * (1.0 + abs(fine[-1])):
+        with np.errstate(invalid="ignore"):
+            fine, coarse = numeric(step), numeric(3.0 * step)
+        if not np.isfinite(fine + coarse).all() or np.linalg.norm(fine - coarse) > 0.02 * (1.0 + abs(fine[-1])):
             continue  # a kink: two corners of polytopes take turns as nearest points, and d has no derivative
         compared += 1
         right = bool(

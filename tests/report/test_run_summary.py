@@ -63,7 +63,7 @@ def result() -> RunResult:
 def test_everything_a_reader_wants_is_there(result):
     text = rendered(result)
     for words in (
-        "C1: sdf-tvcbf-qp on franka",
+        "C1: dual-tvcbf-qp on franka",
         "REACHED in 3.10 s, without contact",
         "1.234 m (panda_hand_tcp)",
         "2.500 rad",

@@ -60,7 +60,7 @@ def test_a_good_scenario_assembles(file: Path) -> None:
     file.write_text(PLANAR)
     trial = assemble(load_scenario(file))
     assert trial.robot.n == 2
-    assert trial.scenario.controller.alpha == 1.0  # resolved
+    assert trial.scenario.controller.alpha == 3.0  # resolved: the default of dual-tvcbf-qp
 
 
 def test_counts_of_joints(file: Path) -> None:

@@ -249,4 +249,4 @@ def test_damaged_foreign_or_newer_folder_is_one_clear_line(tmp_path: Path, how: 
 
 def test_default_name() -> None:
     result = a_result()
-    assert default_folder(result.scenario, 7) == Path("runs/S1-sdf-tvcbf-qp-3-7")
+    assert default_folder(result.scenario, 7) == Path("runs/S1-dual-tvcbf-qp-3-7")

@@ -186,27 +186,37 @@ def nearest_contacts(
     kept = choose(search, count, (COLD_SECOND if cold else WARM_SECOND) + sheets, ALIKE, True)
     for i in range(kept):
         _improve(body, q, parts, o, search, chosen[i], 3, CLOSE)
-    if cold:
-        _finish_best(body, q, parts, o, search, count, sheets + SPARE, count, COLD_STEPS)
-    else:
-        _finish_best(body, q, parts, o, search, count, sheets + SPARE, sheets + SPARE + RETRIES, WARM_STEPS)
+    # Where there was a contact a moment ago there is one now, as a rule: then the search gives up on none too soon.
+    thorough = wide or warm > 0
+    most = count if cold else sheets + SPARE + RETRIES
+    _finish_best(body, q, parts, o, search, count, sheets + SPARE, most, thorough, COLD_STEPS if cold else WARM_STEPS)
     _remember(memory, o, search, choose(search, count, sheets + SPARE, ALIKE, True))
     return choose(search, count, sheets, DISTINCT, False)
 
 
 @njit
 def _finish_best(
-    body: Body, q: Array, parts: Parts, o: int, search: Search, count: int, wanted: int, most: int, steps: int
+    body: Body,
+    q: Array,
+    parts: Parts,
+    o: int,
+    search: Search,
+    count: int,
+    wanted: int,
+    most: int,
+    thorough: bool,
+    steps: int,
 ) -> None:
     """Finish candidates, the most promising first, until ``wanted`` are contacts or ``most`` have been tried.
 
+    If ``thorough``, more than ``most`` are tried as long as none was a contact.
     All others, and those that turn out to be none, get an infinite cost.
     """
     found, tried = search.found, search.tried
     tried[:] = False
     contacts = 0
-    for _ in range(most):
-        if contacts == wanted:
+    for tries in range(count):
+        if contacts == wanted or (tries >= most and (contacts > 0 or not thorough)):
             break
         best = -1
         for c in range(count):
