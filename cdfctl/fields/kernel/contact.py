@@ -37,7 +37,6 @@ LONGEST_RESTORATION = 1.0  # rad
 LONGEST_STEP = 0.35  # rad
 CURVATURE = 20.0  # σ to begin with, 1/m: of a surface of 5 cm radius; half and twice as much cost a fifth more steps
 GREATEST_CURVATURE = 60.0  # 1/m
-STIFFEST = 15.0  # greatest λ σ Tᵀ T: long levers would make the steps along a flat link far too short
 LOCAL = 0.2  # rad: the residual below which a secant says something of the curvature at the contact
 AT_LIMIT = 1e-6  # rad: a joint nearer than this to a limit is at it
 STILL = 1e-9  # m/rad: no joint moves the contact
@@ -232,7 +231,6 @@ def hessian(body: Body, found: Candidates, c: int, scratch: Scratch) -> None:
     B, J = scratch.B, scratch.J
     for i in range(3):
         scratch.normal[i] = normal[i]
-    lever = 0.0
     for j in range(B.shape[0]):
         if not chain.moves[j, joint]:
             store(J, j, (0.0, 0.0, 0.0))
@@ -240,11 +238,6 @@ def hessian(body: Body, found: Candidates, c: int, scratch: Scratch) -> None:
             store(J, j, vec(found.axis[c], j))
         else:
             store(J, j, cross(vec(found.axis[c], j), sub(a, vec(found.translation[c], j))))
-        J_j = vec(J, j)
-        lever += dot(J_j, J_j) - dot(normal, J_j) ** 2
-    if multiplier * lever > 0.0:
-        found.curvature[c] = min(found.curvature[c], STIFFEST / (multiplier * lever))
-    for j in range(B.shape[0]):
         J_j = vec(J, j)
         along = dot(normal, J_j)
         for i in range(j + 1):
