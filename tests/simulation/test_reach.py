@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from cdfctl.scenario.library import load_scenario
 from cdfctl.simulation.assemble import assemble
