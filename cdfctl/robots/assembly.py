@@ -58,6 +58,8 @@ def assemble_robot(file: RobotFile, urdf_path: Path, package_dirs: Sequence[Path
         chain=chain,
         hash=_hash(chain, names, bodies),
         notes=(*(_lock_note(urdf, name, value) for name, value in locked.items()), *_merge_notes(file), *file.notes),
+        urdf=urdf.path,
+        package_dirs=tuple(package_dirs),
     )
 
 

@@ -84,6 +84,8 @@ class Robot:
         chain: the kinematic tree as arrays.
         hash: sha256 of all that a contact depends on: kinematics, geometry, position limits (not the velocity limit).
         notes: facts to print with results.
+        urdf: the URDF file it was read from.
+        package_dirs: where ``package://`` mesh names of that file are looked for.
     """
 
     name: str
@@ -105,6 +107,8 @@ class Robot:
     chain: Chain = field(repr=False)
     hash: str
     notes: tuple[str, ...]
+    urdf: Path = field(repr=False)
+    package_dirs: tuple[Path, ...] = field(repr=False)
 
     def tip_position(self, q: Array) -> Array:
         """Position (3,) of the tip frame in the world at configuration ``q`` (n,), m."""

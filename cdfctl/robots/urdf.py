@@ -54,7 +54,7 @@ def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> Urdf:
     Raises:
         InputError: anything that keeps the file from being a robot, in one line.
     """
-    root = _parse(path)
+    root = parse_urdf(path)
     links = _names(path, root, "link")
     _names(path, root, "joint")
     joints = {}
@@ -69,11 +69,12 @@ def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> Urdf:
         for visual in link.findall("visual"):
             link.remove(visual)
         for collision in link.findall("collision"):
-            _check_collision(path, link.attrib["name"], collision, package_dirs)
+            check_geometry(path, link.attrib["name"], collision, package_dirs)
     return Urdf(path, ElementTree.tostring(root, encoding="unicode"), joints, links)
 
 
-def _parse(path: Path) -> Element:
+def parse_urdf(path: Path) -> Element:
+    """The root of a URDF's XML. Raises :class:`InputError` where the file is none, in one line."""
     if path.is_dir():
         raise InputError(f"{path}: is a directory, not a URDF file")
     try:
@@ -179,11 +180,16 @@ def _check_tree(path: Path, root: Element, links: Sequence[str]) -> None:
                 raise InputError(f"{path}: link '{link}' is in a loop of joints")
 
 
-def _check_collision(path: Path, link: str, collision: Element, package_dirs: Sequence[Path]) -> None:
-    where = f"{path}: collision geometry of link '{link}'"
-    _numbers(where, collision.find("origin"), "xyz", 3)
-    _numbers(where, collision.find("origin"), "rpy", 3)
-    geometry = collision.find("geometry")
+def check_geometry(path: Path, link: str, element: Element, package_dirs: Sequence[Path]) -> None:
+    """Refuse a ``<collision>`` or ``<visual>`` of ``link`` that cannot be read; a mesh gets its absolute file name.
+
+    Raises:
+        InputError: what is wrong with it, in one line.
+    """
+    where = f"{path}: {element.tag} geometry of link '{link}'"
+    _numbers(where, element.find("origin"), "xyz", 3)
+    _numbers(where, element.find("origin"), "rpy", 3)
+    geometry = element.find("geometry")
     shape = None if geometry is None else next(iter(geometry), None)
     if shape is None or shape.tag not in ("mesh", "box", "sphere", "cylinder"):
         found = "nothing" if shape is None else f"<{shape.tag}>"
