@@ -325,6 +325,9 @@ class Trajectory:
         V, slack: (N,).
         infeasible: (N,).
         step_time: (N,) s, wall clock of the controller's step.
+        plant_t: (P+1,) s, and
+        plant_q: (P+1, n): all states known of a plant that does not move in straight lines, those of ``t`` among them;
+            None for the integrator.
     """
 
     t: Array
@@ -339,6 +342,15 @@ class Trajectory:
     step_time: Array
     h_sdf: Array | None = None
     contact_q: Array | None = None
+    plant_t: Array | None = None
+    plant_q: Array | None = None
+
+    @property
+    def path(self) -> tuple[Array, Array]:
+        """The finest record of the motion: times (P+1,) and configurations (P+1, n), straight lines between them."""
+        if self.plant_t is None or self.plant_q is None:
+            return self.t, self.q
+        return self.plant_t, self.plant_q
 
 
 Outcome = Literal["reached", "collision", "timeout", "infeasible", "error"]

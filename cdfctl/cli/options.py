@@ -35,6 +35,16 @@ Controller: TypeAlias = Annotated[
     str | None,
     typer.Option("--controller", metavar="NAME", help="Controller. [default: the scenario's]", show_default=False),
 ]
+Plant: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        "--plant",
+        metavar="NAME",
+        help="What becomes of a commanded velocity: kinematic (the integrator), mujoco (physics). "
+        "[default: the scenario's]",
+        show_default=False,
+    ),
+]
 Settings: TypeAlias = Annotated[
     list[str] | None,
     typer.Option(
@@ -55,11 +65,15 @@ RunFolder: TypeAlias = Annotated[
 ]
 
 
-def overrides(settings: list[str] | None, controller: str | None, seed: int | None) -> list[Override]:
-    """``--set``, then ``--controller`` and ``--seed``, as overrides of the scenario's fields; the last one wins."""
+def overrides(
+    settings: list[str] | None, controller: str | None, seed: int | None, plant: str | None = None
+) -> list[Override]:
+    """``--plant``, ``--set``, then ``--controller`` and ``--seed``, as overrides of the scenario's fields; the last one
+    wins. The plant comes first so that ``--set plant.timestep=...`` meets the plant it is for."""
     from cdfctl.scenario.overrides import Override, parse_override
 
-    changes = [parse_override(setting) for setting in settings or ()]
+    changes = [] if plant is None else [Override(("plant",), plant, f"--plant {plant}", switch=True)]
+    changes += [parse_override(setting) for setting in settings or ()]
     if controller is not None:
         changes.append(Override(("controller", "variant"), controller, f"--controller {controller}"))
     if seed is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from types import FrameType
 from typing import TYPE_CHECKING
 
@@ -25,6 +25,7 @@ def run(
     controller: options.Controller = None,
     seed: options.Seed = None,
     trial: options.Trial = 0,
+    plant: options.Plant = None,
     settings: options.Settings = None,
     out: options.RunFolder = None,
     json: options.Json = False,
@@ -34,7 +35,7 @@ def run(
     """Run a scenario once, judge it, and write a run folder."""
     from cdfctl.scenario.library import load_scenario
 
-    file = load_scenario(scenario, options.overrides(settings, controller, seed))
+    file = load_scenario(scenario, options.overrides(settings, controller, seed, plant))
 
     # The heavy imports, once the file is known to be good.
     from cdfctl.fields.table.store import run_hint
@@ -68,7 +69,7 @@ def run(
 def follow(wired: Trial, *, quiet: bool) -> bool:
     """Run to the end, with a progress bar where standard error is a terminal; False if interrupted on the way."""
     steps = wired.run()
-    with suppress(KeyboardInterrupt), interrupts() as interrupted:
+    with suppress(KeyboardInterrupt), interrupts() as interrupted, closing(steps):
         if quiet or not sys.stderr.isatty():
             return all(not interrupted() for _ in steps)
         from rich.progress import BarColumn, Progress, TextColumn

@@ -10,6 +10,7 @@ from rich.panel import Panel
 from rich.text import Text
 
 from cdfctl.report.tables import bullets, facts
+from cdfctl.simulation.plants import Report
 from cdfctl.simulation.result import RunResult, step_milliseconds
 from cdfctl.types import Outcome, Verdict
 
@@ -20,6 +21,20 @@ STYLES: Mapping[Outcome, str] = {
     "infeasible": "yellow",
     "error": "red",
 }
+
+
+UNITS: Mapping[str, str] = {
+    "_rad_s": "rad/s",
+    "_m_s": "m/s",
+    "_rad": "rad",
+    "_Hz": "Hz",
+    "_Nm": "Nm",
+    "_mm": "mm",
+    "_ms": "ms",
+    "_m": "m",
+    "_s": "s",
+}
+"""How a plant's names end, and the unit that says; a longer one before its own ending."""
 
 
 def run_summary(result: RunResult, run_dir: str, tip: str, notes: Sequence[str] = ()) -> RenderableType:
@@ -53,8 +68,9 @@ def headline(result: RunResult) -> str:
             return f"REACHED in {seconds(verdict.time_to_reach)}, without contact"
         case "collision":
             contact = verdict.contact
-            where = f" at {seconds(contact.time)}: {contact.link} touches {contact.obstacle}" if contact else ""
-            return f"COLLISION{where}"
+            if contact is None:
+                return f"COLLISION: {result.reason}"  # the plant felt what the judge does not see
+            return f"COLLISION at {seconds(contact.time)}: {contact.link} touches {contact.obstacle}"
         case "timeout":
             return f"TIMEOUT: not reached within {simulation.time_limit:g} s, without contact"
         case "infeasible":
@@ -77,10 +93,23 @@ def figures(result: RunResult, run_dir: str, tip: str) -> list[tuple[str, str]]:
         ("path of the joints", f"{verdict.joint_path:.3f} rad"),
         ("least clearance", clearance(verdict)),
         ("infeasible steps", infeasible),
+        *plant_figures(result.plant),
         ("step time", f"{milliseconds(times['p50'])} median, {milliseconds(times['p99'])} p99"),
         ("draw", f"seed {scenario.seed}, trial {result.trial}"),
         ("run folder", run_dir),
     ]
+
+
+def plant_figures(report: Report) -> list[tuple[str, str]]:
+    """What a plant reports, an entry a line; its unit is the end of its name."""
+    kind, *entries = report.items()
+    lines = [("plant", str(kind[1]))] if entries else []
+    for name, value in entries:
+        suffix = next((s for s in UNITS if name.endswith(s)), "")
+        shown = "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)
+        label = name.removesuffix(suffix).replace("_", " ")
+        lines.append((label, f"{shown} {UNITS[suffix]}" if suffix and value is not None else shown))
+    return lines
 
 
 def clearance(verdict: Verdict) -> str:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cdfctl.errors import InputError
+from cdfctl.scenario.plant import expanded
 from cdfctl.scenario.problems import Path, Problem, ScenarioErrors, parse_path, path_text
 from cdfctl.scenario.schema import Scenario
 from cdfctl.scenario.wording import validate
@@ -19,11 +20,20 @@ from cdfctl.scenario.yaml_loader import YamlError, read
 
 @dataclass(frozen=True)
 class Override:
-    """A field set from outside the file: its path, its plain value, and what the user wrote to set it."""
+    """A field set from outside the file.
+
+    Attributes:
+        path: which field.
+        value: its plain value.
+        origin: what the user wrote to set it.
+        switch: ``value`` is the type of the section at ``path``: one of that type keeps its options, any other is
+            replaced.
+    """
 
     path: Path
     value: Any
     origin: str
+    switch: bool = False
 
 
 def parse_override(text: str, flag: str = "--set") -> Override:
@@ -50,16 +60,18 @@ def parse_override(text: str, flag: str = "--set") -> Override:
 def apply(data: Any, overrides: Sequence[Override]) -> tuple[Any, list[Problem]]:
     """A copy of ``data`` with the overrides set, later ones over earlier ones; and those that have no place in it."""
     data = copy.deepcopy(data)
+    if isinstance(data, dict) and "plant" in data:
+        data["plant"] = expanded(data["plant"])  # so that plant.timestep has a place where the file says plant: mujoco
     problems = []
     for override in overrides:
         try:
-            data = _set(data, override.path, override.value)
+            data = _set(data, override.path, override.value, override.switch)
         except InputError as error:
             problems.append(Problem("", error.message, path_text(override.path), error.hint, origin=override.origin))
     return data, problems
 
 
-def _set(data: Any, path: Path, value: Any) -> Any:
+def _set(data: Any, path: Path, value: Any, switch: bool = False) -> Any:
     """``data`` with ``value`` at ``path``; a section the file leaves out is made, an item of a list is not."""
     root: Any = data if data is not None else {}
     parent, parts = root, list(path)
@@ -75,7 +87,7 @@ def _set(data: Any, path: Path, value: Any) -> Any:
         elif not isinstance(parent, dict):
             raise InputError(f"{here} is a single value, without fields")
         if i == len(parts) - 1:
-            parent[part] = value
+            parent[part] = _switched(parent.get(part), value) if switch and isinstance(parent, dict) else value
         elif isinstance(part, int):
             parent = parent[part]
         else:
@@ -83,6 +95,11 @@ def _set(data: Any, path: Path, value: Any) -> Any:
                 parent[part] = {}
             parent = parent.get(part)
     return root
+
+
+def _switched(section: Any, kind: Any) -> Any:
+    """``section`` as it is where it is of the type ``kind``, else one of that type without options."""
+    return section if isinstance(section, dict) and section.get("type") == kind else {"type": kind}
 
 
 def set_fields(scenario: Scenario, values: Mapping[str, Any], origin: str = "set") -> Scenario:

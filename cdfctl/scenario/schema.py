@@ -15,6 +15,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from cdfctl.errors import name_hint
 from cdfctl.scenario.consistency import inconsistencies
+from cdfctl.scenario.plant import KinematicConfig, PlantField
 from cdfctl.scenario.shapes import Body, ObstacleConfig
 from cdfctl.scenario.values import (
     Label,
@@ -232,6 +233,7 @@ class Scenario(Strict):
         tuple[ObstacleConfig, ...], BeforeValidator(ListOf(noun="obstacles")), about("what to keep away from")
     ] = ()
     controller: Annotated[ControllerConfig, about("by which controller")] = ControllerConfig()
+    plant: PlantField = KinematicConfig()
     simulation: Annotated[SimulationConfig, about("the rollout")] = SimulationConfig()
     seed: Annotated[int, BeforeValidator(Whole(0, 2**53 - 1)), about("seed of the draws")] = 0
     assumptions: Annotated[

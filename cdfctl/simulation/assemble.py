@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 
 from cdfctl.control.controller import build
-from cdfctl.errors import InputError
+from cdfctl.errors import InputError, MissingError
 from cdfctl.robots.robot import Robot
-from cdfctl.scenario.draws import draw
+from cdfctl.scenario.draws import UndrawableError, sources
 from cdfctl.scenario.library import ScenarioFile
+from cdfctl.scenario.plant import KinematicConfig, MujocoConfig
 from cdfctl.scenario.problems import path_text
 from cdfctl.scenario.resolve import resolve
 from cdfctl.scenario.schema import ReachTask, Scenario
-from cdfctl.scenario.values import Complaint
+from cdfctl.scenario.values import Complaint, Place
 from cdfctl.simulation.checks import robot_complaints, robot_of, scenario_complaints
+from cdfctl.simulation.drawing import draw_trial
 from cdfctl.simulation.goals import Goal, Touch, goal_of
 from cdfctl.simulation.judge import judge
 from cdfctl.simulation.motion import SceneMotion
-from cdfctl.simulation.plant import KinematicPlant
+from cdfctl.simulation.plants import Plant
+from cdfctl.simulation.plants.kinematic import KinematicPlant
 from cdfctl.simulation.result import RunResult
 from cdfctl.simulation.rollout import Rollout, Step
 from cdfctl.simulation.shapes import vector_of
@@ -42,7 +45,7 @@ class Trial:
     motion: SceneMotion
     rollout: Rollout
 
-    def run(self) -> Iterator[Step]:
+    def run(self) -> Generator[Step]:
         """Run the closed loop, yielding after every control step; it may be left early."""
         return self.rollout.steps()
 
@@ -57,6 +60,7 @@ class Trial:
             verdict=judge(self.robot, self.motion, trajectory, self.rollout.stop),
             stop=self.rollout.stop,
             reason=self.rollout.reason,
+            plant=self.rollout.plant.report(),
         )
 
 
@@ -73,12 +77,14 @@ def assemble(file: ScenarioFile, *, trial: int = 0, robot: Robot | None = None) 
         MissingError: something the scenario needs is not installed.
     """
     file.check_runnable()
-    scenario = resolve(draw(file.scenario, file.scenario.seed, trial))
     try:
-        return _assemble(scenario, trial, robot)
+        robot = robot if robot is not None else _load(file.scenario)
+        return _assemble(resolve(draw_trial(file.scenario, trial, robot)), trial, robot)
+    except UndrawableError as error:
+        raise file.errors([file.located(error.place, error.message, error.hint)]) from None
     except _MisfitError as misfit:
-        found = [file.located(place, message, hint) for message, hint, place in misfit.complaints]
-        raise file.errors(found) from None
+        found = {file.located(_in_file(file.scenario, place), m, hint) for m, hint, place in misfit.complaints}
+        raise file.errors(list(found)) from None
 
 
 def assemble_scenario(scenario: Scenario, *, trial: int = 0, robot: Robot | None = None) -> Trial:
@@ -88,7 +94,7 @@ def assemble_scenario(scenario: Scenario, *, trial: int = 0, robot: Robot | None
         InputError: everything about the scenario that does not fit the robot, one line each.
     """
     try:
-        return _assemble(scenario, trial, robot)
+        return _assemble(scenario, trial, robot if robot is not None else _load(scenario))
     except _MisfitError as misfit:
         raise misfit.as_input_error() from None
 
@@ -104,12 +110,23 @@ class _MisfitError(Exception):
         return InputError("\n".join(lines), hints[0] if len(lines) == 1 and hints else None)
 
 
-def _assemble(scenario: Scenario, trial: int, robot: Robot | None) -> Trial:
-    if robot is None:
-        try:
-            robot = robot_of(scenario.robot)
-        except InputError as error:
-            raise _MisfitError(robot_complaints(scenario.robot, error)) from None
+def _load(scenario: Scenario) -> Robot:
+    try:
+        return robot_of(scenario.robot)
+    except InputError as error:
+        raise _MisfitError(robot_complaints(scenario.robot, error)) from None
+
+
+def _in_file(scenario: Scenario, place: Place) -> Place:
+    """A place in a drawn scenario as one in the file, where a group is one item."""
+    match place:
+        case ("obstacles", int(i), *rest):
+            return ("obstacles", sources(scenario)[i], *rest)
+        case _:
+            return place
+
+
+def _assemble(scenario: Scenario, trial: int, robot: Robot) -> Trial:
     complaints = scenario_complaints(scenario, robot)
     if complaints:
         raise _MisfitError(complaints)
@@ -127,7 +144,7 @@ def _assemble(scenario: Scenario, trial: int, robot: Robot | None) -> Trial:
         goal = goal_of(scenario.task, robot, simulation.tolerance)
     rollout = Rollout(
         controller,
-        KinematicPlant(),
+        plant_of(scenario, robot, motion),
         motion,
         goal,
         vector_of(scenario.robot.q0),
@@ -136,3 +153,17 @@ def _assemble(scenario: Scenario, trial: int, robot: Robot | None) -> Trial:
         target=target,
     )
     return Trial(scenario, trial, robot, motion, rollout)
+
+
+def plant_of(scenario: Scenario, robot: Robot, motion: SceneMotion) -> Plant:
+    """The plant of the scenario's plant section, with its heavy imports.
+
+    Raises:
+        MissingError: its extra is not installed.
+        InputError: it cannot do what the scenario asks of it, or not with this robot.
+    """
+    match scenario.plant:
+        case KinematicConfig():
+            return KinematicPlant()
+        case MujocoConfig():
+            raise MissingError("the plant mujoco is not part of this version")

@@ -1,7 +1,8 @@
 """The judge: scores a rollout by conservative advancement, apart from every field.
 
-Between control steps the configuration moves in a straight line and the obstacles along their closed-form motion. For a
-pair of bodies whose relative speed is at most L, the signed distance d obeys
+Between the recorded states (the control steps, or finer where the plant says what it did in between) the configuration
+moves in a straight line and the obstacles along their closed-form motion. For a pair of bodies whose relative speed is
+at most L, the signed distance d obeys
 
     | d(t) - d(s) | <= L |t - s|         so on [a, b]         d >= ( d(a) + d(b) - L (b - a) ) / 2
 
@@ -27,7 +28,8 @@ CONTACT = 1e-6  # m: contact is d <= CONTACT
 CLEARANCE_TOLERANCE = 1e-4  # m: accuracy of the least clearance
 CHORD = 0.02  # rad (m for a prismatic joint): joint motion between two points of the tip's path
 
-Stop: TypeAlias = Literal["reached", "timeout", "infeasible", "error"]
+Stop: TypeAlias = Literal["reached", "timeout", "infeasible", "contact", "error"]
+"""Why a rollout ended; ``contact``: the plant felt one."""
 
 
 class Motion(Protocol):
@@ -45,11 +47,11 @@ class Motion(Protocol):
 def judge(robot: Robot, motion: Motion, trajectory: Trajectory, stop: Stop) -> Verdict:
     """Score a rollout up to the instant at which it stopped, for the reason ``stop``.
 
-    A plant that failed is ``error``; otherwise the order is collision, infeasible, reached, timeout. A continuous joint
-    must not jump by a turn in ``trajectory.q``.
+    A plant that failed is ``error``; otherwise the order is collision (the judge's, or one the plant felt), infeasible,
+    reached, timeout. A continuous joint must not jump by a turn in ``trajectory.q``.
     """
     sweep = Sweep(robot, motion, trajectory)
-    sampled = bool(np.any(sweep.at_steps <= CONTACT))
+    sampled = bool(np.any(sweep.at_steps[sweep.control] <= CONTACT))
     sweep.find_least()
     contact = sweep.first_contact() if sweep.best - CLEARANCE_TOLERANCE <= CONTACT else None
     outcome = _outcome(stop, contact is not None)
@@ -57,7 +59,7 @@ def judge(robot: Robot, motion: Motion, trajectory: Trajectory, stop: Stop) -> V
         outcome=outcome,
         outcome_sampled=_outcome(stop, sampled),
         time_to_reach=float(trajectory.t[-1]) if outcome == "reached" else None,
-        path_length=tip_path_length(robot, trajectory.q),
+        path_length=tip_path_length(robot, sweep.q),
         joint_path=joint_path_length(trajectory),
         min_clearance=sweep.best,
         min_clearance_time=None if math.isinf(sweep.best) else sweep.best_time,
@@ -67,7 +69,8 @@ def judge(robot: Robot, motion: Motion, trajectory: Trajectory, stop: Stop) -> V
 
 def clearance_curve(robot: Robot, motion: Motion, trajectory: Trajectory) -> Array:
     """Least signed distance (N+1,) robot-obstacle at the control steps, m; +inf without obstacles."""
-    curve: Array = Sweep(robot, motion, trajectory).at_steps.min(axis=1, initial=math.inf)
+    sweep = Sweep(robot, motion, trajectory)
+    curve: Array = sweep.at_steps[sweep.control].min(axis=1, initial=math.inf)
     return curve
 
 
@@ -90,19 +93,23 @@ def joint_path_length(trajectory: Trajectory) -> float:
 
 
 def _outcome(stop: Stop, collided: bool) -> Outcome:
-    return "collision" if collided and stop != "error" else stop
+    if stop == "error":
+        return "error"
+    return "collision" if collided or stop == "contact" else stop
 
 
 class Sweep:
-    """The distances of one run: known at the control steps, searched in between.
+    """The distances of one run: known at N+1 recorded states, searched in between.
 
     Attributes:
-        at_steps: (N+1, pairs) signed distances at the control steps, m.
+        at_steps: (N+1, pairs) signed distances at the recorded states, m.
+        control: which of them are the control steps.
         best, best_time, best_pair: the least distance evaluated so far (m), when (s), and of which pair.
     """
 
     def __init__(self, robot: Robot, motion: Motion, trajectory: Trajectory) -> None:
-        self.robot, self.motion, self.t, self.q = robot, motion, trajectory.t, trajectory.q
+        self.robot, self.motion, (self.t, self.q) = robot, motion, trajectory.path
+        self.control = np.searchsorted(self.t, trajectory.t)
         self.clearance = Clearance(robot, motion.shapes)
         self.at_steps = np.zeros((len(self.t), self.clearance.objects * self.clearance.obstacles))
         frames, centres = [], []
@@ -150,7 +157,7 @@ class Sweep:
             self.best, self.best_time, self.best_pair = distance, t, pair
 
     def find_least(self) -> None:
-        """Search between the control steps until ``best`` is within ``CLEARANCE_TOLERANCE`` of the run's least."""
+        """Search between the recorded states until ``best`` is within ``CLEARANCE_TOLERANCE`` of the run's least."""
         heap: list[tuple[float, int, int, float, float, float, float]] = []
 
         def push(k: int, pair: int, a: float, b: float, d_a: float, d_b: float, speed: float) -> None:
@@ -170,7 +177,7 @@ class Sweep:
             push(k, pair, middle, b, d, d_b, speed)
 
     def first_contact(self) -> Contact | None:
-        """The first contact of the run: every pair advances by steps of ``d / L``, one control step after the other."""
+        """The first contact of the run: every pair advances by steps of ``d / L``, one interval after the other."""
         for k in range(len(self.t) - 1):
             start, end = float(self.t[k]), float(self.t[k + 1])
             found: tuple[float, int] | None = None

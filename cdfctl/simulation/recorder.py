@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from cdfctl.simulation.plants import Track
 from cdfctl.types import Array, Decision, Scene, State, Trajectory
 
 FIRST_CAPACITY = 1024
@@ -34,6 +37,7 @@ class Recorder:
             "step_time": (),
         }
         self._arrays = {name: self._new(name, shape) for name, shape in shapes.items()}
+        self._between: list[Track] = []
 
     def _new(self, name: str, shape: tuple[int, ...]) -> Array:
         extra = 1 if name in STATE_ARRAYS else 0
@@ -42,10 +46,13 @@ class Recorder:
     def start(self, state: State, scene: Scene) -> None:
         """The state before the first step."""
         self._count = 0
+        self._between.clear()
         self._state(0, state, scene)
 
-    def add(self, decision: Decision, step_time: float, state: State, scene: Scene) -> None:
-        """A completed step: what was decided, how long that took (s), and where it led."""
+    def add(
+        self, decision: Decision, step_time: float, state: State, scene: Scene, between: Track | None = None
+    ) -> None:
+        """A completed step: what was decided, how long that took (s), where it led, and by which way."""
         k = self._count
         if k == self._capacity:
             self._grow()
@@ -64,6 +71,7 @@ class Recorder:
                 self._arrays[name] = self._new(name, np.shape(value))
             self._arrays[name][k] = value
         self._count = k + 1
+        self._between.append(between if between is not None else Track(np.zeros(0), np.zeros((0, self._n))))
         self._state(k + 1, state, scene)
 
     def _state(self, k: int, state: State, scene: Scene) -> None:
@@ -82,4 +90,11 @@ class Recorder:
         """A copy of what was recorded."""
         N = self._count
         cut = {name: array[: N + (name in STATE_ARRAYS)].copy() for name, array in self._arrays.items()}
-        return Trajectory(infeasible=cut.pop("infeasible").astype(np.bool_), **cut)
+        trajectory = Trajectory(infeasible=cut.pop("infeasible").astype(np.bool_), **cut)
+        if not any(len(track.t) for track in self._between):
+            return trajectory
+        t, q = [trajectory.t[:1]], [trajectory.q[:1]]
+        for k, track in enumerate(self._between):
+            t += [track.t, trajectory.t[k + 1 : k + 2]]
+            q += [track.q.reshape(-1, self._n), trajectory.q[k + 1 : k + 2]]
+        return replace(trajectory, plant_t=np.concatenate(t), plant_q=np.concatenate(q))

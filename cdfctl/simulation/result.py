@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from cdfctl.scenario.schema import Scenario
 from cdfctl.simulation.judge import Stop
+from cdfctl.simulation.plants import Report
 from cdfctl.types import Trajectory, Verdict
 
 
@@ -25,7 +26,8 @@ class RunResult:
         trajectory: the arrays of the steps completed.
         verdict: the judge's.
         stop: why the rollout ended.
-        reason: what went wrong where ``stop`` is ``error``, None otherwise.
+        reason: what went wrong where ``stop`` is ``error``, what the plant said where it is ``contact``, else None.
+        plant: what the plant has to say of the run.
     """
 
     scenario: Scenario
@@ -35,6 +37,7 @@ class RunResult:
     verdict: Verdict
     stop: Stop
     reason: str | None = None
+    plant: Report = field(default_factory=lambda: {"type": "kinematic"})
 
     @property
     def infeasible_steps(self) -> int:
@@ -60,6 +63,7 @@ class RunResult:
             "infeasible_steps": self.infeasible_steps,
             "step_ms": step_milliseconds(trajectory),
             "run_dir": run_dir,
+            "plant": {name: _number(x) if isinstance(x, float) else x for name, x in self.plant.items()},
         }
 
 

@@ -1,32 +1,25 @@
 """One closed loop: controller, plant and moving scene, step by step, until something ends it.
 
-At control step k, t_k = k dt, in this order: is the goal reached; is the time up; what does the controller command (it
-may give up); the plant moves on. Contact does not end a rollout: that is the judge's to find.
+At control step k, t_k = k dt (on a clock of the plant's own: when its last step ended), in this order: is the goal
+reached; is the time up; what does the controller command (it may give up); the plant moves on, and may say that the run
+must end there. The integrator never does: contact is the judge's to find.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
-from typing import Protocol
 
 from cdfctl.control.controller import Controller
 from cdfctl.errors import PlantError
 from cdfctl.simulation.goals import Goal
 from cdfctl.simulation.judge import Stop
 from cdfctl.simulation.motion import SceneMotion
+from cdfctl.simulation.plants import Plant
 from cdfctl.simulation.recorder import Recorder
 from cdfctl.types import Array, Decision, Scene, State, Trajectory
-
-
-class Plant(Protocol):
-    """Anything that moves as commanded, more or less."""
-
-    def step(self, state: State, u: Array, dt: float) -> State:
-        """The state after ``dt`` (s) at joint velocity ``u`` (n,). Raises :class:`PlantError` where it fails."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -43,8 +36,10 @@ class Rollout:
     """A closed loop to be iterated once; whatever happened so far is in :meth:`trajectory`, also after an interrupt.
 
     Attributes:
+        plant: what moves.
         stop: why it ended; ``error`` while it has not.
-        reason: what went wrong where ``stop`` is ``error``: the plant's failure, or ``interrupted``.
+        reason: what went wrong where ``stop`` is ``error``: the plant's failure, or ``interrupted``; where it is
+            ``contact``, what the plant said.
         max_steps: control steps within the time limit.
     """
 
@@ -61,25 +56,36 @@ class Rollout:
         target: SceneMotion | None = None,
     ) -> None:
         """``q0`` (n,) is the start; ``dt`` and ``time_limit`` are in s; ``target`` is the one body of a reach task."""
-        self._controller, self._plant, self._motion, self._goal = controller, plant, motion, goal
+        self._controller, self.plant, self._motion, self._goal = controller, plant, motion, goal
         self._start, self._dt, self._target = State(0.0, q0), dt, target
         self.max_steps = math.floor(time_limit / dt + 1e-9)  # a limit of 20 s is 200 steps of 0.1 s, not 199
         self.stop: Stop = "error"
         self.reason: str | None = "interrupted"
         self._recorder = Recorder(len(q0), len(motion), self.max_steps)
 
-    def steps(self) -> Iterator[Step]:
+    def steps(self) -> Generator[Step]:
         """Run the loop, yielding after every control step.
 
         The controller is stepped once before the clock starts and then reset, so that compiling its kernels does not
-        count as a step's time.
+        count as a step's time. However the loop ends, the plant is closed.
         """
-        controller, plant, dt = self._controller, self._plant, self._dt
         state, scene = self._start, self._motion.at(self._start.t)
         self._recorder.start(state, scene)
-        controller.reset()
-        controller.step(state, scene, self._target_at(state))
-        controller.reset()
+        self._controller.reset()
+        self._controller.step(state, scene, self._target_at(state))
+        self._controller.reset()
+        try:
+            yield from self._loop()
+        except PlantError as error:
+            self.stop, self.reason = "error", str(error)
+        finally:
+            self.plant.close()
+
+    def _loop(self) -> Iterator[Step]:
+        controller, plant, dt = self._controller, self.plant, self._dt
+        state = plant.start(self._start.q)
+        scene = self._motion.at(state.t)
+        self._recorder.start(state, scene)
         for index in range(self.max_steps + 1):
             at_end = index == self.max_steps
             if self._goal.reached(state, scene, at_end=at_end):
@@ -92,14 +98,13 @@ class Rollout:
             elapsed = time.perf_counter() - began
             if decision.status == "infeasible":
                 return self._end("infeasible")
-            try:
-                after = plant.step(state, decision.u, dt)
-            except PlantError as error:
-                self.reason = str(error)
-                return
+            after = plant.step(state, decision.u, dt)
             now, state, scene = Step(index, state, scene, decision), after, self._motion.at(after.t)
-            self._recorder.add(decision, elapsed, state, scene)
+            self._recorder.add(decision, elapsed, state, scene, plant.between())
             yield now
+            if (said := plant.stopped()) is not None:
+                self.stop, self.reason = "contact", said
+                return None
 
     def _target_at(self, state: State) -> Scene | None:
         return None if self._target is None else self._target.at(state.t)

@@ -35,7 +35,7 @@ SCENARIO, RESULT, TRAJECTORY = "scenario.yaml", "result.json", "trajectory.npz"
 STACK = ("cdfctl", "numpy", "pin", "coal", "numba", "qpsolvers", "daqp", "clarabel")
 """The packages that decide a run's numbers; their versions are kept with it."""
 
-_OPTIONAL_ARRAYS = ("h_sdf", "contact_q")
+_OPTIONAL_ARRAYS = ("h_sdf", "contact_q", "plant_t", "plant_q")
 
 
 @dataclass(frozen=True)
@@ -203,6 +203,8 @@ def _trajectory(arrays: dict[str, Any], path: Path) -> Trajectory:
         "h_sdf": (N, m),
         "contact_q": (N, m, n),
     }
+    if "plant_t" in arrays:
+        expected |= {"plant_t": (arrays["plant_t"].size,), "plant_q": (arrays["plant_t"].size, n)}
     for name, shape in expected.items():
         kind = np.bool_ if name == "infeasible" else np.float64
         array = arrays.get(name)

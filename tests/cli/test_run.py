@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from cdfctl.errors import PlantError
-from cdfctl.simulation.plant import KinematicPlant
+from cdfctl.simulation.plants.kinematic import KinematicPlant
 from cdfctl.simulation.rollout import Rollout
 
 KEYS = {
@@ -35,6 +35,7 @@ KEYS = {
     "infeasible_steps": int,
     "step_ms": dict,
     "run_dir": str,
+    "plant": dict,
 }
 FILES = {"scenario.yaml", "result.json", "trajectory.npz"}
 NEVER = "simulation.time_limit=0.2"

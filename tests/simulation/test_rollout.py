@@ -14,7 +14,7 @@ from cdfctl.scenario.library import load_scenario
 from cdfctl.scenario.schema import BeyondConfig
 from cdfctl.simulation.assemble import Trial, assemble
 from cdfctl.simulation.goals import passed
-from cdfctl.simulation.plant import KinematicPlant
+from cdfctl.simulation.plants.kinematic import KinematicPlant
 from cdfctl.simulation.recorder import FIRST_CAPACITY, Recorder
 from cdfctl.simulation.run_folder import arrays_of
 from cdfctl.types import Array, Decision, Scene, State, Trajectory
@@ -158,7 +158,7 @@ def test_same_scenario_and_seed_same_arrays_to_the_last_bit(name: str) -> None:
                 assert array.tobytes() == other[key].tobytes(), key
 
 
-class FailingPlant:
+class FailingPlant(KinematicPlant):
     def __init__(self, after: int, error: BaseException) -> None:
         self.left, self.error = after, error
 
@@ -166,12 +166,12 @@ class FailingPlant:
         if self.left == 0:
             raise self.error
         self.left -= 1
-        return KinematicPlant().step(state, u, dt)
+        return super().step(state, u, dt)
 
 
 def test_failing_plant_keeps_what_was_done(make: Make) -> None:
     trial = make()
-    trial.rollout._plant = FailingPlant(3, PlantError("the drive is off"))
+    trial.rollout.plant = FailingPlant(3, PlantError("the drive is off"))
     trajectory = run(trial)
     assert len(trajectory.u) == 3
     result = trial.result()
@@ -180,7 +180,7 @@ def test_failing_plant_keeps_what_was_done(make: Make) -> None:
 
 def test_interrupt_keeps_what_was_done(make: Make) -> None:
     trial = make()
-    trial.rollout._plant = FailingPlant(3, KeyboardInterrupt())
+    trial.rollout.plant = FailingPlant(3, KeyboardInterrupt())
     with pytest.raises(KeyboardInterrupt):
         run(trial)
     result = trial.result()

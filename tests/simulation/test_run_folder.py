@@ -38,6 +38,7 @@ KEYS = [
     "infeasible_steps",
     "step_ms",
     "run_dir",
+    "plant",
 ]
 
 
