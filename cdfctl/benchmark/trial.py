@@ -11,8 +11,8 @@ from cdfctl.benchmark.plan import Cell, robot_for
 from cdfctl.benchmark.tables import check_table
 from cdfctl.errors import CdfctlError
 from cdfctl.robots.robot import Robot
-from cdfctl.scenario.draws import draw
 from cdfctl.simulation.assemble import assemble_scenario
+from cdfctl.simulation.drawing import draw_trial
 from cdfctl.simulation.result import RunResult
 from cdfctl.types import TrialKey, TrialResult, Verdict
 
@@ -43,7 +43,7 @@ def run_trial(cell: Cell, trial: int, keep: Keep) -> Answer:
     robot = robot_for(cell.scenario, _ROBOTS)
     check_table(cell.scenario, robot, cell.table)
     try:
-        scenario = draw(cell.scenario, cell.scenario.seed, trial)
+        scenario = draw_trial(cell.scenario, trial, robot)
         wired = assemble_scenario(scenario, trial=trial, robot=robot)
         for _ in wired.run():
             pass

@@ -6,10 +6,12 @@ report, also where some other part of the file does not validate.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
-from cdfctl.scenario.values import Complaint
+from cdfctl.scenario.placing import MOST_COPIES, MOST_OBSTACLES
+from cdfctl.scenario.values import Complaint, Place
 
 ONE_A_JOINT = (("task", "goal"), ("task", "pose"), ("controller", "effort_weight"), ("controller", "smoothness_weight"))
 MAX_STEPS = 1_000_000
@@ -17,7 +19,7 @@ MAX_STEPS = 1_000_000
 
 def inconsistencies(data: dict[str, Any]) -> list[Complaint]:
     """Message, hint and place of everything that disagrees in the scenario ``data``."""
-    return [*_joint_counts(data), *_names(data), *_steps(data)]
+    return [*_joint_counts(data), *_names(data), *_steps(data), *_rules(data)]
 
 
 def _joint_counts(data: dict[str, Any]) -> Iterator[Complaint]:
@@ -39,16 +41,46 @@ def _names(data: dict[str, Any]) -> Iterator[Complaint]:
     if not isinstance(obstacles, list | tuple):
         return
     # An obstacle without a name goes by its place, so "1" may clash as well.
-    seen = {
-        str(i): i for i, item in enumerate(obstacles) if not (isinstance(item, dict) and item.get("name") is not None)
-    }
+    taken: dict[str, int] = {}
+    before = 0
+    for i, item in enumerate(obstacles):
+        if not (isinstance(item, dict) and item.get("name") is not None):
+            taken |= {str(before + k): i for k in range(_members(item))}
+        before += _members(item)
     for i, item in enumerate(obstacles):
         name = item.get("name") if isinstance(item, dict) else None
         if not isinstance(name, str):
             continue
-        if name in seen:
-            yield f"the name '{name}' is taken by obstacles[{seen[name]}]", None, ("obstacles", i, "name")
-        seen.setdefault(name, i)
+        group = item.get("count") is not None or item.get("grid") is not None
+        for own in [f"{name}-{k}" for k in range(1, _members(item) + 1)] if group else [name]:
+            if own in taken:
+                yield f"the name '{own}' is taken by obstacles[{taken[own]}]", None, ("obstacles", i, "name")
+                break
+            taken[own] = i
+
+
+def _members(item: object) -> int:
+    """How many obstacles an item becomes when drawn."""
+    counts = [_get(item, "count"), *(_get(item, "grid", "counts") or ())]
+    known = [c for c in counts if isinstance(c, int) and not isinstance(c, bool) and 0 < c <= MOST_COPIES]
+    return min(math.prod(known), MOST_OBSTACLES)
+
+
+def _rules(data: dict[str, Any]) -> Iterator[Complaint]:
+    """A rule must have something to speak of: a goal pose, a straight path."""
+    obstacles = data.get("obstacles")
+    items = list(enumerate(obstacles)) if isinstance(obstacles, list | tuple) else []
+    places: list[Place] = [("redraw_within",), *(("obstacles", i, "redraw_within") for i, _ in items)]
+    holders = [data, *(item for _, item in items)]
+    reach = _get(data, "task", "type") == "reach"
+    for place, holder in zip(places, holders, strict=True):
+        if reach and _get(holder, "redraw_within", "goal") is not None:
+            yield "a reach task has no goal pose", "leave goal out", (*place, "goal")
+    if _get(data, "redraw_within", "segment") is not None:
+        for i, item in items:
+            if _get(item, "motion") is not None:
+                hint = "the segment of redraw_within needs straight paths: velocity or approach"
+                yield "segment and motion exclude each other", hint, ("obstacles", i, "motion")
 
 
 def _steps(data: dict[str, Any]) -> Iterator[Complaint]:

@@ -47,7 +47,7 @@ def _mapping(dumper: yaml.SafeDumper, value: dict[str, Any]) -> yaml.MappingNode
 
 
 def _is_draw(value: object) -> bool:
-    return isinstance(value, dict) and set(value) == {"uniform"}
+    return isinstance(value, dict) and "uniform" in value
 
 
 _Dumper.add_representer(float, _number)

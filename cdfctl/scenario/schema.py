@@ -3,7 +3,8 @@
 Pure data. Every field says its unit and where its default comes from; the reference page and the JSON Schema are made
 from these models. Defaults live here, and those of the controller's parameters in :mod:`cdfctl.scenario.variants`.
 
-Any number of ``robot.q0``, ``task`` and ``obstacles`` may be ``{uniform: [a, b]}``: drawn once a trial.
+Any number of ``robot.q0``, ``task`` and ``obstacles`` may be ``{uniform: [a, b]}``: drawn once a trial. Where drawn
+obstacles come from, and which draws are refused, is in :mod:`cdfctl.scenario.placing`.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from cdfctl.errors import name_hint
 from cdfctl.scenario.consistency import inconsistencies
+from cdfctl.scenario.placing import RedrawConfig
 from cdfctl.scenario.plant import KinematicConfig, PlantField
 from cdfctl.scenario.shapes import Body, ObstacleConfig
 from cdfctl.scenario.values import (
@@ -127,6 +129,9 @@ class JointGoalTask(Strict):
 
     type: Annotated[Literal["joint-goal"], about("go to a configuration")]
     goal: Annotated[Vector, about("goal configuration, one number a joint", "rad, m for a prismatic joint")]
+    not_before: Annotated[
+        PlainNonNegative | None, about("being there counts from this time on; without it, at any time", "s")
+    ] = None
 
 
 class BeyondConfig(Strict):
@@ -232,6 +237,9 @@ class Scenario(Strict):
     obstacles: Annotated[
         tuple[ObstacleConfig, ...], BeforeValidator(ListOf(noun="obstacles")), about("what to keep away from")
     ] = ()
+    redraw_within: Annotated[
+        RedrawConfig | None, about("when the whole set-up is drawn again: any obstacle breaks one of these")
+    ] = None
     controller: Annotated[ControllerConfig, about("by which controller")] = ControllerConfig()
     plant: PlantField = KinematicConfig()
     simulation: Annotated[SimulationConfig, about("the rollout")] = SimulationConfig()

@@ -7,10 +7,12 @@ arm too (z = 0).
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from cdfctl.scenario.placing import MOST_COPIES, MOST_OBSTACLES, ApproachConfig, GridConfig, RedrawConfig
 from cdfctl.scenario.values import (
     Complaint,
     Label,
@@ -25,6 +27,7 @@ from cdfctl.scenario.values import (
     Strict,
     Uniform,
     Vector3,
+    Whole,
     about,
     high,
     low,
@@ -168,12 +171,21 @@ class Body(Strict):
     velocity: Annotated[Vector3, about("constant velocity of its origin, world axes", "m/s")] = ZERO
     angular_velocity: Annotated[Vector3, about("constant angular velocity, world axes", "rad/s")] = ZERO
     motion: Annotated[Motion | None, about("another motion than a constant twist")] = None
+    approach: Annotated[
+        ApproachConfig | None, about("instead of position and velocity: when, where and how fast it passes a point")
+    ] = None
 
     @model_validator(mode="after")
     def _coherent(self) -> Self:
         complaints = _quaternion(self.orientation, ("orientation",))
         waypoints = isinstance(self.motion, WaypointMotion)
-        if self.position is None and not waypoints:
+        if self.approach is not None:
+            given = {"position": self.position, "velocity": self.velocity, "motion": self.motion}
+            for name, value in given.items():
+                if value not in (None, ZERO):
+                    hint = "the approach says where it is and how it moves"
+                    complaints.append((f"{name} and approach exclude each other", hint, (name,)))
+        elif self.position is None and not waypoints:
             complaints.append(("missing key 'position'", "its origin at t = 0, [x, y, z] in m", ("position",)))
         if self.position is not None and waypoints:
             hint = "leave position out: motion.positions says where it is"
@@ -185,9 +197,34 @@ class Body(Strict):
 
 
 class ObstacleConfig(Body):
-    """One obstacle."""
+    """One obstacle, or a group of them: ``count`` draws, each with its copies on ``grid``."""
 
-    name: Annotated[Label | None, about("its name in reports; without one, its place in the list, from 0")] = None
+    name: Annotated[
+        Label | None,
+        about("its name in reports; without one, its place in the list, from 0; in a group name-1, name-2, ..."),
+    ] = None
+    count: Annotated[
+        int | None, BeforeValidator(Whole(1, MOST_COPIES)), about("so many obstacles, each drawn for itself")
+    ] = None
+    grid: Annotated[GridConfig | None, about("copies of each draw, side by side")] = None
+    redraw_within: Annotated[RedrawConfig | None, about("when this obstacle, with its copies, is drawn again")] = None
+
+    @model_validator(mode="after")
+    def _group(self) -> Self:
+        complaints: list[Complaint] = []
+        if self.grid is not None and isinstance(self.motion, WaypointMotion):
+            complaints.append(("grid and waypoints exclude each other", "a grid needs a position", ("grid",)))
+        if self.redraw_within is not None and self.redraw_within.segment is not None and self.motion is not None:
+            hint = "its path must be a straight line: velocity or approach"
+            complaints.append(("segment and motion exclude each other", hint, ("redraw_within", "segment")))
+        if self.members > MOST_OBSTACLES:
+            complaints.append((f"{self.members} obstacles are too many", f"at most {MOST_OBSTACLES}", ("grid",)))
+        return _unless(complaints, self)
+
+    @property
+    def members(self) -> int:
+        """How many obstacles it becomes when drawn."""
+        return (self.count or 1) * (math.prod(self.grid.counts) if self.grid is not None else 1)
 
 
 def _either(first: object, second: object, first_name: str, second_name: str) -> None:

@@ -64,9 +64,10 @@ def found(value: object) -> str:
 
 
 class Uniform(Strict):
-    """A number drawn once a trial, uniformly from [a, b]."""
+    """A number drawn once a trial, uniformly from [a, b]; ``mirrored``: it or its negative, with equal chance."""
 
     uniform: tuple[float, float]
+    mirrored: Literal[True] | None = None
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,7 @@ class Real:
         pair = {"type": "array", "items": number, "minItems": 2, "maxItems": 2}
         draw = {
             "type": "object",
-            "properties": {"uniform": pair},
+            "properties": {"uniform": pair, "mirrored": {"const": True}},
             "required": ["uniform"],
             "additionalProperties": False,
         }
@@ -108,7 +109,7 @@ class Real:
     def check(self, value: object) -> float | Uniform:
         """``value`` as a float or a draw, or the error that says why not."""
         if isinstance(value, Uniform):
-            value = {"uniform": list(value.uniform)}
+            value = value.model_dump(exclude_none=True)
         if isinstance(value, dict):
             return self._draw(value)
         return self._number(value)
@@ -132,8 +133,10 @@ class Real:
         if not self.drawable:
             only = "draws are for robot.q0, task and obstacles, so that every controller meets the same trial"
             raise refuse(f"expected one number, found {found(value)}", only if "uniform" in value else None)
-        if set(value) != {"uniform"}:
+        if not {"uniform"} <= set(value) <= {"uniform", "mirrored"}:
             raise refuse(f"expected a number, found {found(value)}", "a draw is written {uniform: [a, b]}")
+        if value.get("mirrored", True) is not True:
+            raise refuse(f"mirrored is true or left out, found {found(value['mirrored'])}")
         ends = value["uniform"]
         if not isinstance(ends, list | tuple) or len(ends) != 2:
             raise refuse(f"uniform needs two numbers [a, b], found {found(ends)}")
@@ -142,7 +145,12 @@ class Real:
             raise refuse(f"uniform needs a <= b, found [{low!r}, {high!r}]")
         if not math.isfinite(high - low):
             raise refuse("uniform spans too wide a range")
-        return Uniform(uniform=(low, high))
+        if "mirrored" not in value:
+            return Uniform(uniform=(low, high))
+        if low < 0.0:
+            raise refuse(f"a mirrored draw needs 0 <= a <= b, found [{low!r}, {high!r}]")
+        self._number(-high)
+        return Uniform(uniform=(low, high), mirrored=True)
 
 
 @dataclass(frozen=True)
@@ -290,7 +298,9 @@ def floats(values: Iterable[float | Uniform]) -> tuple[float, ...]:
 
 def low(value: float | Uniform) -> float:
     """The least value a number can take."""
-    return value.uniform[0] if isinstance(value, Uniform) else value
+    if isinstance(value, Uniform):
+        return -value.uniform[1] if value.mirrored else value.uniform[0]
+    return value
 
 
 def high(value: float | Uniform) -> float:

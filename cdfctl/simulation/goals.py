@@ -1,6 +1,6 @@
 """When a task is done: the test the rollout makes at every control step.
 
-joint goal   |q_goal - q|_2 <= tolerance
+joint goal   |q_goal - q|_2 <= tolerance, at or after ``not_before``
 hold         the same for the pose, and all obstacles' origins beyond the plane of ``until``; without ``until``, at
              the time limit only
 reach        V <= reach_tolerance, V the distance of robot and target in the controller's field
@@ -20,6 +20,9 @@ from cdfctl.scenario.schema import BeyondConfig, HoldTask, JointGoalTask
 from cdfctl.simulation.motion import SceneMotion
 from cdfctl.simulation.shapes import vector_of
 from cdfctl.types import Array, Scene, State
+
+ROUNDING = 1e-9
+"""s: a sum of control steps may fall short of a time by its rounding."""
 
 
 class Goal(Protocol):
@@ -53,6 +56,7 @@ class Configuration:
         tolerance: greatest 2-norm of the difference, rad.
         beyond: the plane all obstacles must have passed, or None.
         only_at_end: the goal counts at the time limit only.
+        not_before: the goal counts from this time on, s.
     """
 
     robot: Robot
@@ -60,10 +64,13 @@ class Configuration:
     tolerance: float
     beyond: BeyondConfig | None = None
     only_at_end: bool = False
+    not_before: float = 0.0
 
     def reached(self, state: State, scene: Scene, *, at_end: bool) -> bool:
         """Whether the task is done in this ``state`` and ``scene``; ``at_end`` at the time limit."""
         if self.only_at_end and not at_end:
+            return False
+        if state.t < self.not_before - ROUNDING:
             return False
         if self.beyond is not None and not passed(scene, self.beyond):
             return False
@@ -74,7 +81,7 @@ def goal_of(task: JointGoalTask | HoldTask, robot: Robot, tolerance: float) -> C
     """The goal of a task that ends at a configuration, within ``tolerance`` (rad)."""
     match task:
         case JointGoalTask():
-            return Configuration(robot, vector_of(task.goal), tolerance)
+            return Configuration(robot, vector_of(task.goal), tolerance, not_before=task.not_before or 0.0)
         case HoldTask():
             beyond = task.until.obstacles_beyond if task.until is not None else None
             return Configuration(robot, vector_of(task.pose), tolerance, beyond, only_at_end=beyond is None)

@@ -27,7 +27,7 @@ from cdfctl.scenario.yaml_loader import read
 
 from .conftest import GOOD
 
-NAMES = ["C1", "C2", "C3", "S1", "S2", "S3", "planar-1", "reach-collinear", "reach"]
+NAMES = ["C1", "C2", "C3", "S1", "S2", "S3", "X1", "X2", "X3", "X4", "planar-1", "reach-collinear", "reach"]
 POSE = (0.35, -0.32, -1.70, 0.18, 2.05, -0.20)
 
 
@@ -44,11 +44,11 @@ def test_shipped_scenarios(name):
     assert scenario.assumptions
     assert scenario.controller.variant == ("cdf-tvcbf-tvclf-qp" if name.startswith("reach") else "dual-tvcbf-qp")
     check_runnable(scenario)
-    assert scenario.robot.limits.velocity == 2.0
+    assert scenario.robot.limits.velocity == (1.0 if name in ("X3", "X4") else 2.0)
     assert (scenario.simulation.dt, scenario.simulation.time_limit) == (0.1, 20.0)
     if not name.startswith("reach"):
-        assert scenario.controller.gain == (4.0 if name[0] == "C" else 9.9)
-    assert has_draws(scenario) == (name[0] in "SC")
+        assert scenario.controller.gain == (4.0 if scenario.robot.name == "franka" else 9.9)
+    assert has_draws(scenario) == (name[0] in "SCX")
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -135,7 +135,7 @@ def test_reach_is_valid_but_cannot_run_without_a_controller_for_it(monkeypatch):
         ("mine", "unknown scenario 'mine'", "./mine.yaml"),
         ("mine.yml", "mine.yml: no such file", "did you mean mine.yaml?"),
         ("S1.yml", "S1.yml: no such file", "did you mean S1?"),
-        ("no/where/x.yaml", "no/where/x.yaml: no such file", "go by name"),
+        ("no/where/other.yaml", "no/where/other.yaml: no such file", "go by name"),
         ("x" * 5000 + ".yaml", "no such file", "go by name"),
         ("./", "./: is a directory, not a scenario file", "scenario files in it: mine.yaml"),
     ],
