@@ -19,8 +19,8 @@ help:  ## list these targets
 run: $(STAMPS)/run  ## set up, then run the main job: a Franka among moving balls (SCENARIO=... for another)
 	$(BIN)/cdfctl run $(SCENARIO)
 
-test: $(STAMPS)/test  ## set up, then run the tests with coverage
-	$(BIN)/python -m pytest --cov --cov-report=term $(ARGS)
+test: $(STAMPS)/test  ## set up, then run the tests on all cores with coverage
+	$(BIN)/python -m pytest --numprocesses=logical --dist=loadgroup --cov --cov-report=term $(ARGS)
 
 lint: $(STAMPS)/lint  ## style and format of the code
 	$(BIN)/ruff check .
