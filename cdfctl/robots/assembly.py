@@ -14,17 +14,26 @@ from cdfctl.robots.joints import check_limits, limited_joints, locked_joints
 from cdfctl.robots.meshes import reason_of
 from cdfctl.robots.robot import Chain, Robot, robot_hash
 from cdfctl.robots.robot_file import RobotFile
+from cdfctl.robots.srdf import allowed_contacts, read_srdf
 from cdfctl.robots.urdf import Urdf, read_urdf
 from cdfctl.types import Array
 
 
-def assemble_robot(file: RobotFile, urdf_path: Path, package_dirs: Sequence[Path], speed: float | None = None) -> Robot:
+def assemble_robot(
+    file: RobotFile,
+    urdf_path: Path,
+    package_dirs: Sequence[Path],
+    srdf: Path | None = None,
+    speed: float | None = None,
+    acceleration: float | None = None,
+) -> Robot:
     """Build the robot of ``file`` from its URDF; errors as in :func:`~cdfctl.robots.robot.load_robot`.
 
-    ``speed`` (rad/s or m/s), where given, is the velocity limit of every joint, whatever the URDF says.
+    ``speed`` (rad/s or m/s) and ``acceleration`` (rad/s² or m/s²), where given, are the limits of every joint, whatever
+    the files say.
     """
     urdf = read_urdf(urdf_path, package_dirs)
-    joints = limited_joints(file, urdf, speed)
+    joints = limited_joints(file, urdf, speed, acceleration)
     locked = locked_joints(file, urdf)
     model, geometry = _reduced(urdf, locked)
     names = tuple(str(name) for name in model.names)[1:]
@@ -37,6 +46,8 @@ def assemble_robot(file: RobotFile, urdf_path: Path, package_dirs: Sequence[Path
     links = _unique(body.link for body in bodies if body.joint > 0)
     if not links:
         raise InputError(f"{urdf.path}: no moving link has collision geometry")
+    geometry_links = tuple(body.link for body in bodies)
+    disabled = read_srdf(srdf, urdf.links) if srdf is not None else ()
     chain = _chain(model, lower, upper, np.array([joint.type == "continuous" for joint in moving]))
     return Robot(
         name=file.name,
@@ -47,19 +58,21 @@ def assemble_robot(file: RobotFile, urdf_path: Path, package_dirs: Sequence[Path
         lower=lower,
         upper=upper,
         velocity_limit=np.array([joint.velocity for joint in moving]),
+        acceleration_limit=np.array([joint.acceleration for joint in moving]),
         continuous=chain.continuous,
         prismatic=chain.prismatic,
         home=_home(file, lower, upper),
         tip=_tip(file, model),
         links=links,
         base_links=_unique(body.link for body in bodies if body.joint == 0),
-        geometry_links=tuple(body.link for body in bodies),
+        geometry_links=geometry_links,
         pieces=convex_pieces(bodies, links),
         chain=chain,
         hash=_hash(chain, names, bodies),
         notes=(*(_lock_note(urdf, name, value) for name, value in locked.items()), *_merge_notes(file), *file.notes),
         urdf=urdf.path,
         package_dirs=tuple(package_dirs),
+        allowed_contacts=allowed_contacts(disabled, urdf.parents, geometry_links, file.merge),
     )
 
 

@@ -13,6 +13,12 @@ import numpy as np
 from cdfctl.robots.convex import ConvexSet, box_vertices, convex_hull, segment_vertices
 from cdfctl.types import Array, Box, Capsule, ConvexMesh, Cylinder, IntArray, Shape, Sphere
 
+# coal's default of 1e-6 leaves errors of up to 6e-3 in the direction of one distance in 25, at the same cost.
+GJK_TOLERANCE = 1e-9
+EPA_TOLERANCE = 1e-9
+# coal's 64 leave 1 mm of error in the depth of a segment along a cylinder's axis.
+EPA_ITERATIONS = 256
+
 
 def coal_shape(shape: Shape) -> Any:
     """The coal geometry of an obstacle's shape, in the obstacle's frame; a point cloud is many and has none."""
@@ -72,3 +78,33 @@ def convex_form(geometry: Any) -> tuple[Any, ConvexSet, IntArray]:
     points = np.array(geometry.points() if isinstance(geometry, coal.Convex) else geometry.vertices())
     vertices, faces = convex_hull(points)
     return coal_convex(vertices, faces), ConvexSet(vertices), faces
+
+
+def exact_request(request: Any) -> Any:
+    """``request``, a coal distance request, set to signed distances as exact as coal gives them."""
+    request.gjk_tolerance, request.epa_tolerance = GJK_TOLERANCE, EPA_TOLERANCE
+    request.epa_max_iterations = EPA_ITERATIONS
+    request.enable_signed_distance = True
+    return request
+
+
+def bounding_ball(geometry: Any) -> Array:
+    """Centre and radius (4,) of a ball that contains a geometry, in its frame."""
+    import coal
+
+    if isinstance(geometry, coal.Sphere):
+        return np.array([0.0, 0.0, 0.0, geometry.radius])
+    if isinstance(geometry, coal.Capsule):
+        return np.array([0.0, 0.0, 0.0, geometry.radius + geometry.halfLength])
+    if isinstance(geometry, coal.Cylinder):
+        return np.array([0.0, 0.0, 0.0, np.hypot(geometry.radius, geometry.halfLength)])
+    if isinstance(geometry, coal.Box):
+        return np.array([0.0, 0.0, 0.0, np.linalg.norm(geometry.halfSide)])
+    if isinstance(geometry, coal.Convex):
+        points = np.array(geometry.points())
+    elif geometry.num_vertices == 1:
+        points = np.array([geometry.vertex(0)])  # vertices() hands a single one back as memory of something else
+    else:
+        points = np.array(geometry.vertices())
+    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return np.append(centre, np.linalg.norm(points - centre, axis=1).max())

@@ -11,8 +11,11 @@ from cdfctl.robots.robot_file import RobotFile
 from cdfctl.robots.urdf import Urdf, UrdfJoint
 
 
-def limited_joints(file: RobotFile, urdf: Urdf, speed: float | None = None) -> dict[str, UrdfJoint]:
-    """The URDF's moving joints with the limits of the robot file in place; ``speed`` is one for every joint."""
+def limited_joints(
+    file: RobotFile, urdf: Urdf, speed: float | None = None, acceleration: float | None = None
+) -> dict[str, UrdfJoint]:
+    """The URDF's moving joints with the limits of the robot file in place; ``speed`` and ``acceleration``, where given,
+    are those of every joint."""
     joints = dict(urdf.joints)
     for name, (lower, upper) in file.position_limits.items():
         joint = _find(joints, name, f"robot '{file.name}': position limit")
@@ -29,6 +32,12 @@ def limited_joints(file: RobotFile, urdf: Urdf, speed: float | None = None) -> d
     if speed is not None:
         bound = _positive(file, "velocity limit", speed)
         joints = {name: replace(joint, velocity=bound) for name, joint in joints.items()}
+    for name, bound in file.acceleration_limits.items():
+        joint = _find(joints, name, f"robot '{file.name}': acceleration limit")
+        joints[name] = replace(joint, acceleration=_positive(file, f"acceleration limit of joint '{name}'", bound))
+    if acceleration is not None:
+        bound = _positive(file, "acceleration limit", acceleration)
+        joints = {name: replace(joint, acceleration=bound) for name, joint in joints.items()}
     return joints
 
 

@@ -73,6 +73,7 @@ class Robot:
         joint_names: (n,).
         lower, upper: (n,) position limits, rad or m; ±inf for a continuous joint.
         velocity_limit: (n,) bound on the absolute value of u, rad/s or m/s.
+        acceleration_limit: (n,) bound on the change of u, rad/s² or m/s²; inf where there is none.
         continuous: (n,) the joint wraps at 2 pi.
         prismatic: (n,) the joint slides.
         home: (n,) an example configuration: the robot file's, else mid-range.
@@ -86,6 +87,8 @@ class Robot:
         notes: facts to print with results.
         urdf: the URDF file it was read from.
         package_dirs: where ``package://`` mesh names of that file are looked for.
+        allowed_contacts: pairs of link names, in alphabetical order, whose contact is no collision of the robot with
+            itself, with the reason: ``neighbours``, or ``SRDF``.
     """
 
     name: str
@@ -96,6 +99,7 @@ class Robot:
     lower: Array
     upper: Array
     velocity_limit: Array
+    acceleration_limit: Array
     continuous: BoolArray
     prismatic: BoolArray
     home: Array
@@ -109,6 +113,7 @@ class Robot:
     notes: tuple[str, ...]
     urdf: Path = field(repr=False)
     package_dirs: tuple[Path, ...] = field(repr=False)
+    allowed_contacts: Mapping[tuple[str, str], str] = field(repr=False)
 
     def tip_position(self, q: Array) -> Array:
         """Position (3,) of the tip frame in the world at configuration ``q`` (n,), m."""
@@ -134,6 +139,8 @@ def load_robot(
     lock: Mapping[str, float] | None = None,
     position_limits: Mapping[str, tuple[float, float]] | None = None,
     velocity_limits: Mapping[str, float] | float | None = None,
+    acceleration_limits: Mapping[str, float] | float | None = None,
+    srdf: str | Path | None = None,
     tip: str | None = None,
 ) -> Robot:
     """A shipped robot by name, or the robot of a robot file (.yaml) or of a URDF (.urdf).
@@ -145,6 +152,8 @@ def load_robot(
         position_limits: joint name to (lower, upper) in rad or m, in place of the URDF's.
         velocity_limits: joint name to the bound on its speed in rad/s or m/s, in place of the URDF's; or one bound for
             every joint.
+        acceleration_limits: the same in rad/s² or m/s², in place of the robot file's; a URDF has none.
+        srdf: which links may touch, in place of the robot file's.
         tip: frame whose path length is reported.
 
     Raises:
@@ -158,7 +167,7 @@ def load_robot(
     suffix = path.suffix.lower()
     own_dirs = tuple(Path(entry) for entry in package_dirs)
     if suffix == ".urdf":
-        file, urdf = None, path
+        file, urdf, file_srdf = None, path, None
     else:
         if suffix in ROBOT_FILE_SUFFIXES:
             file_path = path
@@ -169,21 +178,30 @@ def load_robot(
         else:
             raise unknown_name("robot", text, shipped_names())
         file = read_robot_file(file_path)
-        urdf, file_dirs = find_urdf(file, file_path)
+        urdf, file_dirs, file_srdf = find_urdf(file, file_path)
         own_dirs += file_dirs
     if file is None:
         file = RobotFile(version=1, name=path.stem, description="", source=str(path), licence="", urdf=path.name)
-    speed = None if velocity_limits is None or isinstance(velocity_limits, Mapping) else float(velocity_limits)
-    named = velocity_limits if isinstance(velocity_limits, Mapping) else {}
+    speed, speeds = _one_or_named(velocity_limits)
+    acceleration, accelerations = _one_or_named(acceleration_limits)
     changes = {
         "lock": {**file.lock, **(lock or {})},
         "position_limits": {**file.position_limits, **(position_limits or {})},
-        "velocity_limits": {} if speed is not None else {**file.velocity_limits, **named},
+        "velocity_limits": {} if speed is not None else {**file.velocity_limits, **speeds},
+        "acceleration_limits": {} if acceleration is not None else {**file.acceleration_limits, **accelerations},
         "tip": tip if tip is not None else file.tip,
         # The file's home is for the joints the file leaves free.
         "home": file.home if set(lock or ()) <= set(file.lock) else None,
     }
-    return assemble_robot(file.model_copy(update=changes), urdf, own_dirs, speed)
+    own_srdf = file_srdf if srdf is None else Path(srdf)
+    return assemble_robot(file.model_copy(update=changes), urdf, own_dirs, own_srdf, speed, acceleration)
+
+
+def _one_or_named(limits: Mapping[str, float] | float | None) -> tuple[float | None, Mapping[str, float]]:
+    """Limits as one for every joint, or by name."""
+    if limits is None or isinstance(limits, Mapping):
+        return None, limits or {}
+    return float(limits), {}
 
 
 def frame_index(model: Any, name: str) -> int:

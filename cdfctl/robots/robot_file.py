@@ -30,12 +30,13 @@ class DataPackage(_Strict):
 
 
 class RobotFile(_Strict):
-    """A robot file, version 1. Positions in rad (m for prismatic joints), velocities in rad/s (m/s).
+    """A robot file, version 1. Positions in rad (m for prismatic joints), velocities in rad/s, accelerations in rad/s².
 
     Attributes:
         urdf: path of the URDF, relative to the root of ``package``; without one, to this file.
         package_dirs: where ``package://`` mesh names are looked for, relative to this file.
         lock: joints to lock, and where.
+        srdf: path of an SRDF that says which links may touch, relative as ``urdf``.
         merge: a new name for links that move together, which become one convex hull.
         tip: frame whose path length is reported.
         home: an example configuration out of contact.
@@ -48,12 +49,14 @@ class RobotFile(_Strict):
     source: str
     licence: str
     urdf: str = Field(min_length=1)
+    srdf: str | None = Field(default=None, min_length=1)
     package: DataPackage | None = None
     package_dirs: tuple[str, ...] = ()
     lock: dict[str, FiniteFloat] = {}
     merge: dict[str, tuple[str, ...]] = {}
     position_limits: dict[str, tuple[FiniteFloat, FiniteFloat]] = {}
     velocity_limits: dict[str, FiniteFloat] = {}
+    acceleration_limits: dict[str, FiniteFloat] = {}
     tip: str | None = None
     home: tuple[FiniteFloat, ...] | None = None
     notes: tuple[str, ...] = ()
@@ -99,15 +102,15 @@ def read_robot_file(path: Path) -> RobotFile:
     return file
 
 
-def find_urdf(file: RobotFile, path: Path) -> tuple[Path, tuple[Path, ...]]:
-    """The robot's URDF and its package directories, for a robot file that lies at ``path``.
+def find_urdf(file: RobotFile, path: Path) -> tuple[Path, tuple[Path, ...], Path | None]:
+    """The robot's URDF, its package directories and its SRDF, for a robot file that lies at ``path``.
 
     Raises:
         MissingError: the data package it names is not installed.
     """
     package_dirs = tuple(path.parent / entry for entry in file.package_dirs)
     if file.package is None:
-        return path.parent / file.urdf, package_dirs
+        return path.parent / file.urdf, package_dirs, path.parent / file.srdf if file.srdf else None
     try:
         distribution = importlib.metadata.distribution(file.package.distribution)
     except importlib.metadata.PackageNotFoundError:
@@ -116,7 +119,7 @@ def find_urdf(file: RobotFile, path: Path) -> tuple[Path, tuple[Path, ...]]:
             hint=f"pip install {file.package.distribution}",
         ) from None
     root = Path(str(distribution.locate_file(file.package.root)))
-    return root / file.urdf, (root, *package_dirs)
+    return root / file.urdf, (root, *package_dirs), root / file.srdf if file.srdf else None
 
 
 def _read_text(path: Path) -> str:

@@ -24,7 +24,8 @@ NO_LIMIT = 1.0e9
 
 @dataclass(frozen=True)
 class UrdfJoint:
-    """A joint that moves: ``lower`` and ``upper`` (rad or m, ±inf if continuous), ``velocity`` (nan if not given)."""
+    """A joint that moves: ``lower`` and ``upper`` (rad or m, ±inf if continuous), ``velocity`` (nan if not given),
+    ``acceleration`` (rad/s² or m/s²; a URDF has none: inf)."""
 
     name: str
     type: str
@@ -32,16 +33,19 @@ class UrdfJoint:
     upper: float
     velocity: float
     mimic: tuple[str, float, float] | None  # (joint, multiplier, offset)
+    acceleration: float = math.inf
 
 
 @dataclass(frozen=True)
 class Urdf:
-    """A checked URDF: its ``text`` for Pinocchio, the moving ``joints`` by name, the names of ``links``."""
+    """A checked URDF: its ``text`` for Pinocchio, the moving ``joints`` by name, the names of ``links``, and the
+    parent link of every link but the root, by any joint."""
 
     path: Path
     text: str
     joints: Mapping[str, UrdfJoint]
     links: tuple[str, ...]
+    parents: Mapping[str, str]
 
 
 def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> Urdf:
@@ -64,13 +68,13 @@ def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> Urdf:
             joints[joint.name] = joint
     if not joints:
         raise InputError(f"{path}: no joint that moves", hint=f"a moving joint is {' or '.join(MOVING_TYPES)}")
-    _check_tree(path, root, links)
+    parents = _tree(path, root, links)
     for link in root.findall("link"):
         for visual in link.findall("visual"):
             link.remove(visual)
         for collision in link.findall("collision"):
             check_geometry(path, link.attrib["name"], collision, package_dirs)
-    return Urdf(path, ElementTree.tostring(root, encoding="unicode"), joints, links)
+    return Urdf(path, ElementTree.tostring(root, encoding="unicode"), joints, links, parents)
 
 
 def parse_urdf(path: Path) -> Element:
@@ -160,8 +164,8 @@ def _mimic(where: str, element: Element) -> tuple[str, float, float] | None:
     return mimic.get("joint", ""), multiplier, offset
 
 
-def _check_tree(path: Path, root: Element, links: Sequence[str]) -> None:
-    """Exactly one link without a parent, no link with two, no loop."""
+def _tree(path: Path, root: Element, links: Sequence[str]) -> dict[str, str]:
+    """Each link's parent; refused unless exactly one link has none, no link has two, and there is no loop."""
     parent: dict[str, str] = {}
     for element in root.findall("joint"):
         up, down = (next(element.iter(end)).attrib["link"] for end in ("parent", "child"))
@@ -178,6 +182,7 @@ def _check_tree(path: Path, root: Element, links: Sequence[str]) -> None:
             link, steps = parent[link], steps + 1
             if steps > len(links):
                 raise InputError(f"{path}: link '{link}' is in a loop of joints")
+    return parent
 
 
 def check_geometry(path: Path, link: str, element: Element, package_dirs: Sequence[Path]) -> None:

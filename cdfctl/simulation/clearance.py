@@ -12,14 +12,9 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from cdfctl.robots.coal_geometry import coal_shape
+from cdfctl.robots.coal_geometry import bounding_ball, coal_shape, exact_request
 from cdfctl.robots.robot import Robot
 from cdfctl.types import Array, PointCloud, Scene, Shape
-
-GJK_TOLERANCE = 1e-9
-EPA_TOLERANCE = 1e-9
-# coal's 64 leave 1 mm of error in the depth of a segment along a cylinder's axis.
-EPA_ITERATIONS = 256
 
 
 class Nearest(NamedTuple):
@@ -53,11 +48,11 @@ class Clearance:
                 self._geometry.addCollisionPair(pin.CollisionPair(a, self.objects + i))
         self._bodies = list(self._geometry.geometryObjects)
         self._data, self._placed = robot.model.createData(), pin.GeometryData(self._geometry)
-        self._request = _exact(coal.DistanceRequest())
+        self._request = exact_request(coal.DistanceRequest())
         for request in self._placed.distanceRequests:
-            _exact(request)
-        self.robot_spheres = np.array([_sphere(body.geometry) for body in self._bodies[: self.objects]])
-        spheres = np.array([_sphere(body.geometry) for body in self._bodies[self.objects :]]).reshape(-1, 4)
+            exact_request(request)
+        self.robot_spheres = np.array([bounding_ball(body.geometry) for body in self._bodies[: self.objects]])
+        spheres = np.array([bounding_ball(body.geometry) for body in self._bodies[self.objects :]]).reshape(-1, 4)
         radius = np.array([shape.radius if isinstance(shape, PointCloud) else 0.0 for shape in shapes])
         self.reach: Array = np.linalg.norm(spheres[:, :3], axis=1) + spheres[:, 3] + radius
 
@@ -135,13 +130,6 @@ def nearest_each(robot: Robot, q: Array, scene: Scene) -> list[Nearest]:
     ]
 
 
-def _exact(request: Any) -> Any:
-    request.gjk_tolerance, request.epa_tolerance = GJK_TOLERANCE, EPA_TOLERANCE
-    request.epa_max_iterations = EPA_ITERATIONS
-    request.enable_signed_distance = True
-    return request
-
-
 def _cloud_tree(points: Array) -> Any:
     """coal's bounding volume tree over the points, each as a triangle without extent."""
     tree, vertices, triangles = coal.BVHModelOBBRSS(), coal.StdVec_Vec3s(), coal.StdVec_Triangle()
@@ -152,23 +140,3 @@ def _cloud_tree(points: Array) -> Any:
     tree.addSubModel(vertices, triangles)
     tree.endModel()
     return tree
-
-
-def _sphere(geometry: Any) -> Array:
-    """Centre and radius (4,) of a ball that contains a geometry, in its frame."""
-    if isinstance(geometry, coal.Sphere):
-        return np.array([0.0, 0.0, 0.0, geometry.radius])
-    if isinstance(geometry, coal.Capsule):
-        return np.array([0.0, 0.0, 0.0, geometry.radius + geometry.halfLength])
-    if isinstance(geometry, coal.Cylinder):
-        return np.array([0.0, 0.0, 0.0, np.hypot(geometry.radius, geometry.halfLength)])
-    if isinstance(geometry, coal.Box):
-        return np.array([0.0, 0.0, 0.0, np.linalg.norm(geometry.halfSide)])
-    if isinstance(geometry, coal.Convex):
-        points = np.array(geometry.points())
-    elif geometry.num_vertices == 1:
-        points = np.array([geometry.vertex(0)])  # vertices() hands a single one back as memory of something else
-    else:
-        points = np.array(geometry.vertices())
-    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    return np.append(centre, np.linalg.norm(points - centre, axis=1).max())
