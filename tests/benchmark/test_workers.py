@@ -88,7 +88,7 @@ def finished(process: subprocess.Popen[str]) -> tuple[int, str]:
     return process.returncode, err
 
 
-LONG = ("--trials", 150, "--jobs", 2, "--keep", "none", "--quiet")
+LONG = ("--trials", 80, "--jobs", 2, "--keep", "none", "--quiet")
 
 
 @pytest.mark.skipif(not Path("/proc").exists(), reason="looks for the workers in /proc")
@@ -120,7 +120,7 @@ def test_killed_and_interrupted_it_goes_on_where_it_was(here: Path) -> None:
     last = bench(here, *TWO, *LONG, "--out", store)
     assert (last.returncode, last.stderr) == (0, "")
     assert trials(store).startswith(kept)
-    plan = make_plan(["./small.yaml"], TWO[1::2], [], [()], trials=150, seed=0)
+    plan = make_plan(["./small.yaml"], TWO[1::2], [], [()], trials=80, seed=0)
     with open_store(here / "fresh", plan) as fresh:
         for answer in Runner(plan, 1, "none").run(range(len(plan))):
             fresh.add(answer)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdfctl.errors import InputError
@@ -169,6 +169,7 @@ def scenarios(draw_: st.DrawFn) -> Scenario:
     return scenario
 
 
+@settings(max_examples=40)  # three documents each, read twice by a slow reader
 @given(scenarios(), st.integers(0, 2**32), st.integers(0, 10**6))
 def test_dump_loads_back_to_an_equal_scenario(scenario, seed, trial):
     for version in (scenario, resolve(scenario), draw(resolve(scenario), seed, trial)):
