@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from cdfctl.scenario.placing import MOST_COPIES, MOST_OBSTACLES
+from cdfctl.scenario.plant import MujocoConfig, expanded
 from cdfctl.scenario.values import Complaint, Place
 
 ONE_A_JOINT = (("task", "goal"), ("task", "pose"), ("controller", "effort_weight"), ("controller", "smoothness_weight"))
@@ -19,7 +20,7 @@ MAX_STEPS = 1_000_000
 
 def inconsistencies(data: dict[str, Any]) -> list[Complaint]:
     """Message, hint and place of everything that disagrees in the scenario ``data``."""
-    return [*_joint_counts(data), *_names(data), *_steps(data), *_rules(data)]
+    return [*_joint_counts(data), *_names(data), *_steps(data), *_physics_steps(data), *_rules(data)]
 
 
 def _joint_counts(data: dict[str, Any]) -> Iterator[Complaint]:
@@ -91,6 +92,22 @@ def _steps(data: dict[str, Any]) -> Iterator[Complaint]:
         yield f"time_limit {limit} s is shorter than one step, dt {dt} s", None, ("simulation", "time_limit")
     elif limit / dt > MAX_STEPS:
         yield f"time_limit / dt is over {MAX_STEPS:,} steps", "a longer dt or a shorter limit", ("simulation", "dt")
+
+
+def _physics_steps(data: dict[str, Any]) -> Iterator[Complaint]:
+    """A control step of the plant ``mujoco`` is a whole number of steps of the physics."""
+    plant = expanded(data.get("plant"))
+    if not isinstance(plant, dict) or plant.get("type") != "mujoco":
+        return
+    dt, step = _get(data, "simulation", "dt"), plant.get("timestep", MujocoConfig.model_fields["timestep"].default)
+    if not (_is_number(dt) and _is_number(step) and dt > 0.0 and step > 0.0):
+        return
+    count = round(dt / step)
+    if count < 1 or abs(count * step - dt) > 1e-9:
+        what = "is longer than" if step > dt else "does not divide"
+        parts = next((k for k in (1, 2, 4, 5, 8, 10, 16, 20, 25, 40, 50) if k >= dt / step), 100)
+        hint = f"for example plant.timestep={dt / parts:g}"
+        yield f"the step of the physics, {step:g} s, {what} the control step, {dt:g} s", hint, ("plant", "timestep")
 
 
 def _get(data: Any, *keys: str) -> Any:

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 from pydantic import BeforeValidator, Field
 
-from cdfctl.scenario.values import PlainPositive, Strict, about
+from cdfctl.scenario.values import PlainNonNegative, PlainPositive, Strict, about
 
 
 class KinematicConfig(Strict):
@@ -22,6 +22,13 @@ class MujocoConfig(Strict):
     timestep: Annotated[
         PlainPositive, about("step of the physics; simulation.dt must be a whole multiple of it", "s")
     ] = 0.002
+    servo_time: Annotated[
+        PlainPositive,
+        about("time constant of the slowest joint's servo: kv is the arm's greatest inertia over it", "s"),
+    ] = 0.008
+    gravity_compensation: Annotated[
+        PlainNonNegative, about("share of the arm's weight that is compensated: 1 is all of it, 0 none")
+    ] = 1.0
 
 
 PlantConfig: TypeAlias = KinematicConfig | MujocoConfig

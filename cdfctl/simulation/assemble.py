@@ -6,7 +6,7 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 
 from cdfctl.control.controller import build
-from cdfctl.errors import InputError, MissingError
+from cdfctl.errors import InputError
 from cdfctl.robots.robot import Robot
 from cdfctl.scenario.draws import UndrawableError, sources
 from cdfctl.scenario.library import ScenarioFile
@@ -166,4 +166,6 @@ def plant_of(scenario: Scenario, robot: Robot, motion: SceneMotion) -> Plant:
         case KinematicConfig():
             return KinematicPlant()
         case MujocoConfig():
-            raise MissingError("the plant mujoco is not part of this version")
+            from cdfctl.simulation.plants.mujoco import MujocoPlant
+
+            return MujocoPlant(robot, motion, scenario.plant, scenario.simulation.dt)
