@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 from pydantic import BeforeValidator, Field
 
-from cdfctl.scenario.values import PlainNonNegative, PlainPositive, Strict, about
+from cdfctl.scenario.values import Flag, Label, PlainNonNegative, PlainPositive, Strict, about
 
 
 class KinematicConfig(Strict):
@@ -31,7 +31,34 @@ class MujocoConfig(Strict):
     ] = 1.0
 
 
-PlantConfig: TypeAlias = KinematicConfig | MujocoConfig
+class FrankaConfig(Strict):
+    """A Franka Research 3 over libfranka's network interface (extra ``franka``)."""
+
+    type: Annotated[Literal["franka"], about("a Franka Research 3, real or franky-sim (extra franka)")]
+    host: Annotated[
+        Label, about("the arm's address; the default is a simulator on this machine: a real arm is always named")
+    ] = "127.0.0.1"
+    hold: Annotated[
+        PlainPositive | None,
+        about("a command not renewed ramps to zero after this, in the arm's time; without it, 2.5 control steps", "s"),
+    ] = None
+    connect_timeout: Annotated[PlainPositive, about("give up connecting after this", "s")] = 5.0
+    state_timeout: Annotated[PlainPositive, about("without a new state for this long, the run ends", "s")] = 0.5
+    start_tolerance: Annotated[PlainPositive, about("how far each joint may be from robot.q0 at the start", "rad")] = (
+        0.01
+    )
+    move_to_start: Annotated[
+        Flag, about("where it is farther: go there slowly, by the scenario's safety rows; otherwise refuse")
+    ] = False
+    approach_speed: Annotated[PlainPositive, about("greatest joint speed of that", "rad/s")] = 0.2
+    acceleration: Annotated[
+        PlainPositive, about("greatest joint acceleration of the ramp from one command to the next", "rad/s^2")
+    ] = 10.0
+    jerk: Annotated[PlainPositive, about("greatest joint jerk of that ramp", "rad/s^3")] = 5000.0
+    realtime: Annotated[Flag, about("insist on a real-time kernel (franky-sim needs none)")] = False
+
+
+PlantConfig: TypeAlias = KinematicConfig | MujocoConfig | FrankaConfig
 PLANTS: tuple[str, ...] = tuple(get_args(model.model_fields["type"].annotation)[0] for model in get_args(PlantConfig))
 """The plants by name."""
 

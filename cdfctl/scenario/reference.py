@@ -93,7 +93,8 @@ def _kind(schema: dict[str, Any], info: dict[str, Any]) -> str:
         return "draw" if "uniform" in info.get("properties", {}) else "mapping by name"
     if info.get("type") == "array":
         return _list_kind(schema, info)
-    return {"string": "text", "integer": "whole number", "number": "number"}.get(info.get("type", ""), "value")
+    kinds = {"string": "text", "integer": "whole number", "number": "number", "boolean": "true or false"}
+    return kinds.get(info.get("type", ""), "value")
 
 
 def _list_kind(schema: dict[str, Any], info: dict[str, Any]) -> str:

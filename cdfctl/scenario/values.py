@@ -246,6 +246,13 @@ def _named(value: object) -> object:
     return text
 
 
+def _flag(value: object) -> object:
+    if not isinstance(value, bool):
+        hint = "YAML 1.2 knows true and false only" if str(value).lower() in ("yes", "no", "on", "off") else None
+        raise refuse(f"expected true or false, found {found(value)}", hint)
+    return value
+
+
 @dataclass(frozen=True)
 class Whole:
     """A check that a value is a whole number from ``least`` to ``most``."""
@@ -263,6 +270,7 @@ class Whole:
 
 Text = Annotated[str, BeforeValidator(_text)]
 Label = Annotated[str, BeforeValidator(_named)]
+Flag = Annotated[bool, BeforeValidator(_flag)]
 Plain = Annotated[float, Real()]
 PlainPositive = Annotated[float, Real(above=0.0)]
 PlainNonNegative = Annotated[float, Real(least=0.0)]

@@ -10,7 +10,7 @@ from cdfctl.errors import InputError
 from cdfctl.robots.robot import Robot
 from cdfctl.scenario.draws import UndrawableError, sources
 from cdfctl.scenario.library import ScenarioFile
-from cdfctl.scenario.plant import KinematicConfig, MujocoConfig
+from cdfctl.scenario.plant import FrankaConfig, KinematicConfig, MujocoConfig
 from cdfctl.scenario.problems import path_text
 from cdfctl.scenario.resolve import resolve
 from cdfctl.scenario.schema import ReachTask, Scenario
@@ -127,7 +127,7 @@ def _in_file(scenario: Scenario, place: Place) -> Place:
 
 
 def _assemble(scenario: Scenario, trial: int, robot: Robot) -> Trial:
-    complaints = scenario_complaints(scenario, robot)
+    complaints = [*plant_complaints(scenario, robot), *scenario_complaints(scenario, robot)]
     if complaints:
         raise _MisfitError(complaints)
     simulation = scenario.simulation
@@ -169,3 +169,23 @@ def plant_of(scenario: Scenario, robot: Robot, motion: SceneMotion) -> Plant:
             from cdfctl.simulation.plants.mujoco import MujocoPlant
 
             return MujocoPlant(robot, motion, scenario.plant, scenario.simulation.dt)
+        case FrankaConfig():
+            from cdfctl.simulation.plants.franka.approach import SlowApproach
+            from cdfctl.simulation.plants.franka.arm import connect
+            from cdfctl.simulation.plants.franka.plant import FrankaPlant
+
+            approach = SlowApproach(scenario, robot, motion, scenario.plant.approach_speed)
+            return FrankaPlant(scenario.plant, robot, scenario.simulation.dt, connect, approach)
+
+
+def plant_complaints(scenario: Scenario, robot: Robot) -> list[Complaint]:
+    """What the scenario asks that its plant cannot do, as far as it is known before the run."""
+    match scenario.plant:
+        case FrankaConfig():
+            from cdfctl.simulation.plants.franka.limits import complaints
+            from cdfctl.simulation.plants.franka.plant import hold_of
+
+            dt = scenario.simulation.dt
+            return [*complaints(scenario.plant, robot, dt, hold_of(scenario.plant, dt))]
+        case _:
+            return []

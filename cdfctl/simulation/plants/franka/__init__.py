@@ -1,0 +1,1 @@
+"""The plant ``franka``: an arm over libfranka's network interface, real or franky-sim."""
