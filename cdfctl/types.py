@@ -296,6 +296,8 @@ class Decision:
         h_sdf: (m,) the SDF's barrier for ``dual``, None otherwise.
         contact_q: (m, n) nearest contact configuration, NaN where none; None for a field without one.
         V: Lyapunov function, NaN without one.
+        plan_q: (K, n) configurations between which the plan moves straight, the first is q; None without a planner.
+        plan_t: (K,) s from now, when it is there; a shorter plan ends in NaN, in both.
     """
 
     u: Array
@@ -307,6 +309,8 @@ class Decision:
     h_sdf: Array | None = None
     contact_q: Array | None = None
     V: float = float("nan")
+    plan_q: Array | None = None
+    plan_t: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -322,6 +326,9 @@ class Trajectory:
         h: (N, m).
         h_sdf: (N, m) only for ``dual``.
         contact_q: (N, m, n) only for fields with contacts.
+        plan_q: (N, K, n) only for controllers that plan: configurations between which each step's plan moves straight,
+            NaN after its end.
+        plan_t: (N, K) s, when it is there.
         V, slack: (N,).
         infeasible: (N,).
         step_time: (N,) s, wall clock of the controller's step.
@@ -342,6 +349,8 @@ class Trajectory:
     step_time: Array
     h_sdf: Array | None = None
     contact_q: Array | None = None
+    plan_q: Array | None = None
+    plan_t: Array | None = None
     plant_t: Array | None = None
     plant_q: Array | None = None
 

@@ -18,7 +18,7 @@ from typing import cast
 
 import numpy as np
 
-from cdfctl.control.core import Core
+from cdfctl.control.core import Core, core_of
 from cdfctl.control.parameters import resolved
 from cdfctl.control.reaching import Reaching
 from cdfctl.errors import InputError
@@ -29,6 +29,7 @@ from cdfctl.scenario.variants import TASKS_OF
 from cdfctl.types import Array, BoolArray, Decision, Scene, State, as_vector
 
 Nominal = Callable[[State, Scene], Array]
+Pursuit = Callable[[State, Scene], Decision]
 
 
 class Controller:
@@ -39,10 +40,12 @@ class Controller:
         reaching: what draws the robot to a target, None for a task without one.
     """
 
-    def __init__(self, core: Core, nominal: Nominal, reaching: Reaching | None = None) -> None:
+    def __init__(
+        self, core: Core, nominal: Nominal, reaching: Reaching | None = None, pursuit: Pursuit | None = None
+    ) -> None:
         self.core = core
         self.reaching = reaching
-        self._nominal = nominal
+        self._nominal, self._pursuit = nominal, pursuit
 
     def step(self, state: State, scene: Scene, target: Scene | None = None) -> Decision:
         """What to command now; ``target`` is a scene of the one body to reach, for a reach task.
@@ -51,6 +54,8 @@ class Controller:
             InputError: ``state``, ``scene`` or ``target`` is not finite, or there is no target where one is needed.
         """
         as_vector(state.q, self.core.robot.n, "q")
+        if self._pursuit is not None:
+            return self._pursuit(state, scene)
         u_ref = self._nominal(state, scene)
         if self.reaching is None:
             return self.core.step(state.q, scene, u_ref)
@@ -80,24 +85,46 @@ def build(robot: Robot, config: ControllerConfig, task: Task, dt: float) -> Cont
     reaching = None
     if isinstance(task, ReachTask):
         reaching = Reaching(make_field(variant.field, robot), parameters.gamma, dt)
-    return Controller(Core(robot, variant, parameters, dt), nominal(robot, task, parameters.gain), reaching)
+    core = core_of(robot, variant, parameters, dt)
+    return Controller(core, nominal(robot, task, parameters.gain), reaching, _pursuit(core, task))
 
 
 def nominal(robot: Robot, task: Task, gain: float) -> Nominal:
     """The velocity the task asks for, as a function of state and scene."""
-    match task:
-        case JointGoalTask():
-            goal = as_vector(cast("tuple[float, ...]", task.goal), robot.n, "task.goal")
-        case HoldTask():
-            goal = as_vector(cast("tuple[float, ...]", task.pose), robot.n, "task.pose")
-        case ReachTask():
-            still = np.zeros(robot.n)
-            return lambda state, scene: still
+    if isinstance(task, ReachTask):
+        still = np.zeros(robot.n)
+        return lambda state, scene: still
+    goal = _goal(robot, task)
 
     def toward_goal(state: State, scene: Scene) -> Array:
         return gain * difference(goal, state.q, robot.continuous)
 
     return toward_goal
+
+
+def _goal(robot: Robot, task: JointGoalTask | HoldTask) -> Array:
+    match task:
+        case JointGoalTask():
+            return as_vector(cast("tuple[float, ...]", task.goal), robot.n, "task.goal")
+        case HoldTask():
+            return as_vector(cast("tuple[float, ...]", task.pose), robot.n, "task.pose")
+
+
+def _pursuit(core: Core, task: Task) -> Pursuit | None:
+    """What a controller that plans does at every step; None for one that does not."""
+    if not core.variant.plans:
+        return None
+    from cdfctl.control.predictive import PredictiveCore
+
+    assert isinstance(core, PredictiveCore)
+    assert not isinstance(task, ReachTask)  # build() has seen to it
+    goal, planner = _goal(core.robot, task), core
+    until = math.inf if isinstance(task, HoldTask) else task.not_before or 0.0
+
+    def pursue(state: State, scene: Scene) -> Decision:
+        return planner.pursue(state.q, scene, goal, stay=max(0.0, until - state.t), t=state.t)
+
+    return pursue
 
 
 def difference(goal: Array, q: Array, continuous: BoolArray) -> Array:

@@ -65,6 +65,12 @@ class Core:
         for source in self._sources:
             source.field.reset()
 
+    def follow(self, q: Array, scene: Scene, u: Array) -> Decision:
+        """``u`` (n,) as the command, no row asked; what is reported is that of :meth:`step`."""
+        self._u_last = u
+        h = least_barrier(self._sources[0].ask(q, scene), len(scene), self.parameters.margin)
+        return Decision(u=u, h=h, slack=float("nan"), status="optimal", infeasible=False, residual=0.0)
+
     def step(self, q: Array, scene: Scene, u_ref: Array, task: Rows | None = None) -> Decision:
         """The command at configuration ``q`` (n,) in ``scene``, as near as can be to ``u_ref`` (n,), rad/s.
 
@@ -75,7 +81,7 @@ class Core:
             InputError: a pose or velocity of ``scene`` is not finite.
         """
         robot, p = self.robot, self.parameters
-        _check_scene(scene)
+        check_scene(scene)
         answers = [source.ask(q, scene) for source in self._sources]
         parts = [source.rows(a) for source, a in zip(self._sources, answers, strict=True)]
         rows = stack(parts if task is None else [*parts, task], robot.n)
@@ -93,6 +99,15 @@ class Core:
             h_sdf=least_barrier(answers[1], len(scene), p.margin) if len(answers) > 1 else None,
             contact_q=nearest_contact(first, len(scene)) if first.unit == "rad" else None,
         )
+
+
+def core_of(robot: Robot, variant: Variant, parameters: Parameters, dt: float) -> Core:
+    """The core that a variant asks for. Raises :class:`InputError` as :class:`Core`."""
+    if variant.plans:
+        from cdfctl.control.predictive import PredictiveCore
+
+        return PredictiveCore(robot, variant, parameters, dt)
+    return Core(robot, variant, parameters, dt)
 
 
 def least_barrier(query: FieldQuery, m: int, margin: float) -> Array:
@@ -130,7 +145,8 @@ def _source(field_name: str, robot: Robot, variant: Variant, p: Parameters, dt: 
     return RowSource(field, ask, rows)
 
 
-def _check_scene(scene: Scene) -> None:
+def check_scene(scene: Scene) -> None:
+    """Raise :class:`InputError` naming the first obstacle whose pose or velocity is not finite."""
     if np.isfinite(scene.poses).all() and np.isfinite(scene.twists).all():
         return
     for name, pose, twist in zip(scene.names, scene.poses, scene.twists, strict=True):

@@ -33,6 +33,15 @@ class Parameters:
     sheets: int
     on_infeasible: OnInfeasible
     solver: str
+    segments: int | None = None
+    horizon: float | None = None
+    candidates: int | None = None
+    budget_ms: float | None = None
+    planner_seed: int = 0
+    prediction: Literal["constant-twist", "known"] = "constant-twist"
+    delay: float = 0.0
+    position_error: float = 0.0
+    velocity_error: float = 0.0
 
 
 def resolved(config: ControllerConfig) -> tuple[Variant, Parameters]:

@@ -6,7 +6,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from cdfctl.control.core import Core
+from cdfctl.control.core import core_of
 from cdfctl.control.parameters import config_of, resolved
 from cdfctl.robots.robot import Robot
 from cdfctl.scenario.variants import DEFAULT_VARIANT
@@ -34,7 +34,7 @@ class SafetyFilter:
         Raises:
             InputError: an unknown variant or parameter, or a value that is not allowed.
         """
-        self._core = Core(robot, *resolved(config_of(variant, parameters)), dt)
+        self._core = core_of(robot, *resolved(config_of(variant, parameters)), dt)
 
     def step(self, q: ArrayLike, scene: Scene, u_nominal: ArrayLike) -> Decision:
         """The safe velocity now.

@@ -213,6 +213,30 @@ class ControllerConfig(Strict):
         about("when no u satisfies the rows: end the trial, violate the safety rows least, or u = 0"),
     ] = None
     solver: Annotated[Label | None, about("QP solver, any installed one of qpsolvers")] = None
+    segments: Annotated[
+        int | None, BeforeValidator(Whole(1, 8)), about("plans: straight motions before the one to the goal")
+    ] = None
+    horizon: Annotated[PlainPositive | None, about("plans: the longest those motions take together", "s")] = None
+    candidates: Annotated[
+        int | None, BeforeValidator(Whole(1, 1_000_000)), about("plans: how many are tried at a step")
+    ] = None
+    budget_ms: Annotated[
+        PlainPositive | None,
+        about("plans: time the search of a step may take, the best so far is used; without it candidates decide", "ms"),
+    ] = None
+    planner_seed: Annotated[int | None, BeforeValidator(Whole(0, 2**53 - 1)), about("plans: seed of the search")] = None
+    prediction: Annotated[
+        Literal["constant-twist", "known"] | None,
+        about("plans: obstacles keep the twist they have, or the scenario's motions are known to the controller"),
+    ] = None
+    delay: Annotated[PlainNonNegative | None, about("plans: age of the scenes, made up for by p + v delay", "s")] = None
+    position_error: Annotated[
+        PlainNonNegative | None, about("plans: bound on the error of a measured position; widens the margin", "m")
+    ] = None
+    velocity_error: Annotated[
+        PlainNonNegative | None,
+        about("plans: bound on the error of a measured velocity, a share of the speed; widens the margin with time"),
+    ] = None
 
 
 class SimulationConfig(Strict):

@@ -12,7 +12,7 @@ from cdfctl.types import Array, Decision, Scene, State, Trajectory
 FIRST_CAPACITY = 1024
 
 # Arrays with one entry a step, and those with one more: the states between which the steps lie.
-STEP_ARRAYS = ("u", "h", "V", "slack", "infeasible", "step_time", "h_sdf", "contact_q")
+STEP_ARRAYS = ("u", "h", "V", "slack", "infeasible", "step_time", "h_sdf", "contact_q", "plan_q", "plan_t")
 STATE_ARRAYS = ("t", "q", "obstacle_pose", "obstacle_twist")
 
 
@@ -64,7 +64,9 @@ class Recorder:
             "infeasible": decision.infeasible,
             "step_time": step_time,
         }
-        optional = {"h_sdf": decision.h_sdf, "contact_q": decision.contact_q}
+        optional = {"h_sdf": decision.h_sdf, "contact_q": decision.contact_q, "plan_q": decision.plan_q}
+        if decision.plan_t is not None:
+            optional["plan_t"] = self._arrays["t"][k] + decision.plan_t
         given |= {name: array for name, array in optional.items() if array is not None}
         for name, value in given.items():
             if name not in self._arrays:

@@ -35,7 +35,7 @@ SCENARIO, RESULT, TRAJECTORY = "scenario.yaml", "result.json", "trajectory.npz"
 STACK = ("cdfctl", "numpy", "pin", "coal", "numba", "qpsolvers", "daqp", "clarabel")
 """The packages that decide a run's numbers; their versions are kept with it."""
 
-_OPTIONAL_ARRAYS = ("h_sdf", "contact_q", "plant_t", "plant_q")
+_OPTIONAL_ARRAYS = ("h_sdf", "contact_q", "plan_q", "plan_t", "plant_t", "plant_q")
 
 
 @dataclass(frozen=True)
@@ -189,6 +189,7 @@ def _trajectory(arrays: dict[str, Any], path: Path) -> Trajectory:
     if arrays["u"].ndim != 2 or arrays["h"].ndim != 2:
         raise InputError(f"{path}: damaged: 'u' and 'h' must have two axes")
     (N, n), m = arrays["u"].shape, arrays["h"].shape[1]
+    K = arrays["plan_t"].shape[-1] if "plan_t" in arrays and arrays["plan_t"].ndim else 0
     expected: dict[str, tuple[int, ...]] = {
         "t": (N + 1,),
         "q": (N + 1, n),
@@ -202,6 +203,8 @@ def _trajectory(arrays: dict[str, Any], path: Path) -> Trajectory:
         "step_time": (N,),
         "h_sdf": (N, m),
         "contact_q": (N, m, n),
+        "plan_q": (N, K, n),
+        "plan_t": (N, K),
     }
     if "plant_t" in arrays:
         expected |= {"plant_t": (arrays["plant_t"].size,), "plant_q": (arrays["plant_t"].size, n)}

@@ -1,0 +1,1 @@
+"""Rollout plans over predicted obstacles: straight joint motions, checked by conservative advancement."""

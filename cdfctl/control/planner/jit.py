@@ -1,0 +1,55 @@
+"""The compiler of the planner: that of :mod:`cdfctl.fields.kernel`, with a cache of its own.
+
+The machine code holds what it calls of the fields' kernels, so the cache is named after the text of both.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar, cast
+
+import numba
+
+from cdfctl.cache import cache_dir, writable_dir
+from cdfctl.fields.kernel import jit
+from cdfctl.fields.kernel.jit import OPTIONS
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def njit(function: Callable[P, T]) -> Callable[P, T]:
+    """``numba.njit`` with the options of the fields' kernels; the types of ``function`` are kept."""
+    return _compiled(function, forceinline=False)
+
+
+def njit_inline(function: Callable[P, T]) -> Callable[P, T]:
+    """The same, its body put in place of every call: handing some forty arrays on takes longer than the work here."""
+    return _compiled(function, forceinline=True)
+
+
+def _compiled(function: Callable[P, T], *, forceinline: bool) -> Callable[P, T]:
+    config: Any = numba.config
+    if config.DISABLE_JIT:  # a debugger or a coverage run wants plain Python
+        return function
+    folder = _cache()
+    # Numba reads its cache folder once, when a function is decorated: lend it ours for that moment only.
+    theirs = config.CACHE_DIR
+    config.CACHE_DIR = str(folder or theirs)
+    try:
+        return cast(Callable[P, T], numba.njit(cache=folder is not None, forceinline=forceinline, **OPTIONS)(function))
+    finally:
+        config.CACHE_DIR = theirs
+
+
+@cache
+def _cache() -> Path | None:
+    digest = hashlib.sha256(f"{numba.__version__} {platform.python_version()}".encode())
+    for folder in (Path(jit.__file__).parent, Path(__file__).parent):
+        for source in sorted(folder.glob("*.py")):
+            digest.update(source.read_bytes())
+    return writable_dir(cache_dir() / "kernels" / f"planner-{digest.hexdigest()[:16]}")
