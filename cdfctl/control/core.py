@@ -85,7 +85,8 @@ class Core:
         answers = [source.ask(q, scene) for source in self._sources]
         parts = [source.rows(a) for source, a in zip(self._sources, answers, strict=True)]
         rows = stack(parts if task is None else [*parts, task], robot.n)
-        low, high = joint_limit_box(q, robot.lower, robot.upper, robot.velocity_limit, p.limit_alpha)
+        slowest, fastest = robot.velocity_bounds(q, self.dt)
+        low, high = joint_limit_box(q, robot.lower, robot.upper, slowest, fastest, p.limit_alpha)
         command = self._qp.solve(u_ref, self._u_last, rows, low, high)
         self._u_last = command.u
         first = answers[0]

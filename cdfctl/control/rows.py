@@ -105,10 +105,12 @@ def tvclf_row(now: float, ahead: FieldQuery, gamma: float, dt: float) -> Rows:
     )
 
 
-def joint_limit_box(q: Array, lower: Array, upper: Array, velocity_limit: Array, alpha: float) -> tuple[Array, Array]:
+def joint_limit_box(
+    q: Array, lower: Array, upper: Array, slowest: Array, fastest: Array, alpha: float
+) -> tuple[Array, Array]:
     """Joint limits as barriers inside the velocity box, both as bounds on ``u`` (n,).
 
-        -alpha_lim (q - q_min) <= u <= alpha_lim (q_max - q),      -v <= u <= v
+        -alpha_lim (q - q_min) <= u <= alpha_lim (q_max - q),      v_min <= u <= v_max
 
     Outside a limit the barrier asks for a velocity back inside; the clip into the velocity box keeps that bound
     attainable, so the box is never empty. An infinite limit bounds nothing.
@@ -116,11 +118,11 @@ def joint_limit_box(q: Array, lower: Array, upper: Array, velocity_limit: Array,
     Args:
         q: configuration (n,), rad.
         lower, upper: position limits (n,), rad, infinite where the joint has none.
-        velocity_limit: v (n,), rad/s.
+        slowest, fastest: v_min <= 0 and v_max >= 0 (n,), rad/s: the robot's at this configuration.
         alpha: alpha_lim, 1/s.
     """
-    low = np.minimum(np.maximum(-alpha * (q - lower), -velocity_limit), velocity_limit)
-    high = np.maximum(np.minimum(alpha * (upper - q), velocity_limit), -velocity_limit)
+    low = np.minimum(np.maximum(-alpha * (q - lower), slowest), fastest)
+    high = np.maximum(np.minimum(alpha * (upper - q), fastest), slowest)
     return low, high
 
 

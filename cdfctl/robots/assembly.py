@@ -10,6 +10,7 @@ import numpy as np
 
 from cdfctl.errors import InputError, name_hint
 from cdfctl.robots.bodies import Body, body_names, convex_pieces, geometry_model, merge_bodies, read_bodies
+from cdfctl.robots.braking import braking_of
 from cdfctl.robots.joints import check_limits, limited_joints, locked_joints
 from cdfctl.robots.meshes import reason_of
 from cdfctl.robots.robot import Chain, Robot, robot_hash
@@ -58,6 +59,7 @@ def assemble_robot(
         lower=lower,
         upper=upper,
         velocity_limit=np.array([joint.velocity for joint in moving]),
+        braking=braking_of(file, names, urdf.joints),
         acceleration_limit=np.array([joint.acceleration for joint in moving]),
         continuous=chain.continuous,
         prismatic=chain.prismatic,

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cdfctl.errors import InputError, unknown_name
+from cdfctl.robots.braking import Braking
 from cdfctl.robots.convex import ConvexPiece
 from cdfctl.robots.robot_file import (
     DATA,
@@ -73,6 +74,7 @@ class Robot:
         joint_names: (n,).
         lower, upper: (n,) position limits, rad or m; ±inf for a continuous joint.
         velocity_limit: (n,) bound on the absolute value of u, rad/s or m/s.
+        braking: how that bound falls towards the end stops, None where it does not; see :meth:`velocity_bounds`.
         acceleration_limit: (n,) bound on the change of u, rad/s² or m/s²; inf where there is none.
         continuous: (n,) the joint wraps at 2 pi.
         prismatic: (n,) the joint slides.
@@ -99,6 +101,7 @@ class Robot:
     lower: Array
     upper: Array
     velocity_limit: Array
+    braking: Braking | None = field(repr=False)
     acceleration_limit: Array
     continuous: BoolArray
     prismatic: BoolArray
@@ -114,6 +117,17 @@ class Robot:
     urdf: Path = field(repr=False)
     package_dirs: tuple[Path, ...] = field(repr=False)
     allowed_contacts: Mapping[tuple[str, str], str] = field(repr=False)
+
+    def velocity_bounds(self, q: Array, dt: float = 0.0) -> tuple[Array, Array]:
+        """Least and greatest joint velocity (n,) at ``q`` (n,), rad/s or m/s, that may be held for ``dt`` (s).
+
+        Those of an arm whose limits fall towards its end stops are at most 0 and at least 0 there: see
+        :mod:`cdfctl.robots.braking`.
+        """
+        if self.braking is None:
+            return -self.velocity_limit, self.velocity_limit
+        low, high = self.braking.bounds(q, dt)
+        return np.maximum(low, -self.velocity_limit), np.minimum(high, self.velocity_limit)
 
     def tip_position(self, q: Array) -> Array:
         """Position (3,) of the tip frame in the world at configuration ``q`` (n,), m."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.metadata
 import json
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 from pydantic_core import ErrorDetails
@@ -29,6 +29,16 @@ class DataPackage(_Strict):
     root: str
 
 
+class BrakingFile(_Strict):
+    """How one joint's velocity limit falls towards its end stops ``lower`` and ``upper``: see
+    :mod:`cdfctl.robots.braking`."""
+
+    lower: FiniteFloat
+    upper: FiniteFloat
+    deceleration: Annotated[FiniteFloat, Field(gt=0.0)]
+    offset: Annotated[FiniteFloat, Field(ge=0.0)] = 0.0
+
+
 class RobotFile(_Strict):
     """A robot file, version 1. Positions in rad (m for prismatic joints), velocities in rad/s, accelerations in rad/s².
 
@@ -38,6 +48,7 @@ class RobotFile(_Strict):
         lock: joints to lock, and where.
         srdf: path of an SRDF that says which links may touch, relative as ``urdf``.
         merge: a new name for links that move together, which become one convex hull.
+        braking: joints whose velocity limit falls towards the end stops (see :mod:`cdfctl.robots.braking`).
         tip: frame whose path length is reported.
         home: an example configuration out of contact.
         notes: facts to print with results.
@@ -56,6 +67,7 @@ class RobotFile(_Strict):
     merge: dict[str, tuple[str, ...]] = {}
     position_limits: dict[str, tuple[FiniteFloat, FiniteFloat]] = {}
     velocity_limits: dict[str, FiniteFloat] = {}
+    braking: dict[str, BrakingFile] = {}
     acceleration_limits: dict[str, FiniteFloat] = {}
     tip: str | None = None
     home: tuple[FiniteFloat, ...] | None = None

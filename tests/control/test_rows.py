@@ -145,7 +145,7 @@ def test_stack() -> None:
 def test_joint_limit_box_by_hand() -> None:
     q = np.array([0.5, 2.9, -3.2, 1.0])
     lower, upper = np.array([-3.0, -3.0, -3.0, -np.inf]), np.array([3.0, 3.0, 3.0, np.inf])
-    low, high = joint_limit_box(q, lower, upper, np.full(4, 2.0), 3.0)
+    low, high = joint_limit_box(q, lower, upper, np.full(4, -2.0), np.full(4, 2.0), 3.0)
     assert low == pytest.approx([-2.0, -2.0, 0.6, -2.0])  # the third joint, 0.2 under its limit, returns at 0.6
     assert high == pytest.approx([2.0, 0.3, 2.0, 2.0])
 
@@ -163,14 +163,13 @@ def test_joint_limit_box_is_never_empty_and_keeps_the_joint_inside(
 ) -> None:
     upper = lower + width
     low, high = (
-        float(x[0])
-        for x in joint_limit_box(np.array([q]), np.array([lower]), np.array([upper]), np.array([speed]), alpha)
+        float(x[0]) for x in joint_limit_box(*(np.array([x]) for x in (q, lower, upper, -speed, speed)), alpha)
     )
     assert -speed <= low <= high <= speed
     if lower <= q <= upper and alpha * dt <= 1.0:
         assert q + low * dt >= lower - 1e-12 * (1 + abs(lower))
         assert q + high * dt <= upper + 1e-12 * (1 + abs(upper))
-    if q < lower:
+    if q < lower - 1e-9:  # less is lost in rounding
         assert low > 0.0
-    if q > upper:
+    if q > upper + 1e-9:
         assert high < 0.0
