@@ -40,10 +40,23 @@ Plant: TypeAlias = Annotated[
     typer.Option(
         "--plant",
         metavar="NAME",
-        help="What becomes of a commanded velocity: kinematic (the integrator), mujoco (physics). "
+        help="What becomes of a commanded velocity: kinematic (the integrator), mujoco (physics), franka (an arm). "
         "[default: the scenario's]",
         show_default=False,
     ),
+]
+Host: TypeAlias = Annotated[
+    str | None,
+    typer.Option("--host", metavar="ADDRESS", help="Plant franka: where the arm is.", show_default=False),
+]
+MoveToStart: TypeAlias = Annotated[
+    bool,
+    typer.Option(
+        "--move-to-start", help="Plant franka: where the arm is not at the start, go there slowly, by the safety rows."
+    ),
+]
+DryRun: TypeAlias = Annotated[
+    bool, typer.Option("--dry-run", help="Plant franka: print what would be sent; needs no arm and writes no folder.")
 ]
 Settings: TypeAlias = Annotated[
     list[str] | None,
@@ -66,10 +79,15 @@ RunFolder: TypeAlias = Annotated[
 
 
 def overrides(
-    settings: list[str] | None, controller: str | None, seed: int | None, plant: str | None = None
+    settings: list[str] | None,
+    controller: str | None,
+    seed: int | None,
+    plant: str | None = None,
+    host: str | None = None,
+    move_to_start: bool = False,
 ) -> list[Override]:
-    """``--plant``, ``--set``, then ``--controller`` and ``--seed``, as overrides of the scenario's fields; the last one
-    wins. The plant comes first so that ``--set plant.timestep=...`` meets the plant it is for."""
+    """``--plant``, ``--set``, then the options of one field, as overrides of the scenario; the last one wins. The plant
+    comes first so that ``--set plant.timestep=...`` meets the plant it is for."""
     from cdfctl.scenario.overrides import Override, parse_override
 
     changes = [] if plant is None else [Override(("plant",), plant, f"--plant {plant}", switch=True)]
@@ -78,4 +96,8 @@ def overrides(
         changes.append(Override(("controller", "variant"), controller, f"--controller {controller}"))
     if seed is not None:
         changes.append(Override(("seed",), seed, f"--seed {seed}"))
+    if host is not None:
+        changes.append(Override(("plant", "host"), host, f"--host {host}"))
+    if move_to_start:
+        changes.append(Override(("plant", "move_to_start"), True, "--move-to-start"))
     return changes

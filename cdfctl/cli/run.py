@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from cdfctl.cli import options
 from cdfctl.cli.console import note, show, stderr, write_json
+from cdfctl.cli.dry_run import rehearse
 from cdfctl.errors import PlantError
 
 if TYPE_CHECKING:
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 
 INTERRUPTED = 130
 
+INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""What ends a run early with the steps so far kept, and an arm stopped."""
+
 
 def run(
     scenario: options.Scenario,
@@ -26,6 +30,9 @@ def run(
     seed: options.Seed = None,
     trial: options.Trial = 0,
     plant: options.Plant = None,
+    host: options.Host = None,
+    move_to_start: options.MoveToStart = False,
+    dry_run: options.DryRun = False,
     settings: options.Settings = None,
     out: options.RunFolder = None,
     json: options.Json = False,
@@ -35,7 +42,7 @@ def run(
     """Run a scenario once, judge it, and write a run folder."""
     from cdfctl.scenario.library import load_scenario
 
-    file = load_scenario(scenario, options.overrides(settings, controller, seed, plant))
+    file = load_scenario(scenario, options.overrides(settings, controller, seed, plant, host, move_to_start))
 
     # The heavy imports, once the file is known to be good.
     from cdfctl.fields.table.store import run_hint
@@ -46,6 +53,8 @@ def run(
     wired = assemble(file, trial=trial)
     if VARIANTS[wired.scenario.controller.variant].field != "sdf" and (hint := run_hint(wired.robot)):
         note(hint, quiet=quiet)
+    if dry_run:
+        return rehearse(wired, json=json, quiet=quiet)
     folder = out if out is not None else default_folder(wired.scenario, trial)
     check_target(folder)
     finished = follow(wired, quiet=quiet)
@@ -90,7 +99,7 @@ def follow(wired: Trial, *, quiet: bool) -> bool:
 
 @contextmanager
 def interrupts() -> Iterator[Callable[[], bool]]:
-    """Whether Ctrl-C has been pressed, to be asked between steps.
+    """Whether Ctrl-C has been pressed (or the process told to end, or its terminal closed), to be asked between steps.
 
     It raises KeyboardInterrupt too, as usual; but that is lost where it strikes while compiled code is being called.
     """
@@ -101,11 +110,12 @@ def interrupts() -> Iterator[Callable[[], bool]]:
         pressed = True
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGINT, press)
+    before = {number: signal.signal(number, press) for number in INTERRUPTS}
     try:
         yield lambda: pressed
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def status_of(result: RunResult) -> int:

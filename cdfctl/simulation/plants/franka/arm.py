@@ -26,8 +26,8 @@ from cdfctl.types import Array
 POLL = 0.001
 """Wall-clock seconds between two looks at the state: it changes every millisecond."""
 
-AT_REST = 0.01
-"""An arm whose joints are all slower than this (rad/s) stands still."""
+AT_REST, REST_TIME = 0.03, 0.03
+"""An arm whose joints all keep below this mean speed (rad/s) for so long (s) stands still."""
 
 STOP_TIMEOUT = 2.0
 """Wall-clock seconds a stop may take; from full speed it takes 0.3."""
@@ -157,10 +157,14 @@ class FrankyArm:
         robot.move(self._franky.JointVelocityStopMotion(), asynchronous=True)
         robot.join_motion(timeout=STOP_TIMEOUT)
         end = time.monotonic() + STOP_TIMEOUT
+        since, q = began, np.array(robot.state.q)
         while time.monotonic() < end:
             state = robot.state
-            if float(np.abs(state.dq).max()) < AT_REST:
-                return float(state.time.to_sec()) - began
+            t = float(state.time.to_sec())
+            if float(np.abs(np.array(state.q) - q).max()) > AT_REST * REST_TIME:
+                since, q = t, np.array(state.q)
+            elif t - since >= REST_TIME:
+                return since - began
             time.sleep(POLL)
         return None
 

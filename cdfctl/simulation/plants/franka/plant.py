@@ -18,6 +18,7 @@ from cdfctl.robots.robot import Robot
 from cdfctl.scenario.plant import FrankaConfig
 from cdfctl.simulation.plants import Plant, Report, Track
 from cdfctl.simulation.plants.franka.arm import Arm
+from cdfctl.simulation.plants.franka.rehearsal import Rehearsal, Sink
 from cdfctl.simulation.plants.franka.ticks import Ticks
 from cdfctl.types import Array, State
 
@@ -59,6 +60,20 @@ class FrankaPlant(Plant):
         self._scaled = 0
         self._stopped: float | None = None
         self._expired = 0
+
+    def rehearse(self, q0: Array, sink: Sink) -> Report:
+        """Tell ``sink`` every command instead of an arm, one that is at ``q0`` (n,); what would be set up on one."""
+        config = self._config
+        self._connect = lambda _: Rehearsal(q0, sink)
+        return {
+            "host": config.host,
+            "rate_Hz": 1.0 / self._dt,
+            "hold_s": self._hold,
+            "acceleration_rad_s2": config.acceleration,
+            "jerk_rad_s3": config.jerk,
+            "start_tolerance_rad": config.start_tolerance,
+            "move_to_start": config.move_to_start,
+        }
 
     def start(self, q0: Array) -> State:
         """Connect, and check that the arm is at ``q0`` (n,), or go there; the clock is at 0 now.
