@@ -20,7 +20,7 @@ import numpy as np
 
 from cdfctl.errors import MissingError, PlantError
 from cdfctl.scenario.plant import FrankaConfig
-from cdfctl.simulation.plants.franka.limits import FR3, ArmLimits, limits_of
+from cdfctl.simulation.plants.franka.limits import ArmLimits, limits_of, published
 from cdfctl.types import Array
 
 POLL = 0.001
@@ -77,7 +77,7 @@ class FrankyArm:
         self.expired = 0
         self._franky, self._robot, self._host = franky, robot, config.host
         self._state_timeout = config.state_timeout
-        self.limits = FR3
+        self.limits: ArmLimits = published()
         self._moving = False
         self._lost = False
         self._newest = -1.0

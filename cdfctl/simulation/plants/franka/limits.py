@@ -1,11 +1,7 @@
 """What a Franka Research 3 can do, by the robot description that it sends itself; and what a scenario may ask of it.
 
-The greatest velocity of a joint falls as it nears a position limit, from where it could just brake:
-
-    v_max(q) = min(v, max(0, -o + sqrt(2 a (q_max - q)))),     v_min(q) = -min(v, max(0, -o + sqrt(2 a (q - q_min))))
-
-with v the joint's velocity limit, a its deceleration and o an offset: ``<limit>`` and
-``<position_based_velocity_limits>`` of the URDF (source: Franka Robotics, limits for Franka Research 3).
+``<limit>`` of the URDF holds the position and velocity limits, ``<position_based_velocity_limits>`` how the latter fall
+towards the former: :mod:`cdfctl.robots.braking`.
 """
 
 from __future__ import annotations
@@ -13,11 +9,12 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from functools import lru_cache
 
 import numpy as np
 
-from cdfctl.robots.robot import Robot
+from cdfctl.robots.braking import Braking
+from cdfctl.robots.robot import Robot, load_robot
 from cdfctl.scenario.plant import FrankaConfig
 from cdfctl.scenario.values import Complaint
 from cdfctl.types import Array
@@ -33,33 +30,35 @@ LONGEST_HOLD = 1.0
 
 TOLERANCE = 1e-6
 
+BRAKING = "position_based_velocity_limits"
+"""The element of the arm's URDF that says how its velocity limits fall towards the end stops."""
+
 
 @dataclass(frozen=True)
 class ArmLimits:
-    """Limits of an arm's joints, each (n,): positions rad, ``velocity`` rad/s, ``deceleration`` rad/s^2, ``offset``
-    rad/s; a deceleration of +inf where the velocity limit does not depend on position."""
+    """Limits of an arm's joints: positions ``lower`` and ``upper`` (n,), rad; ``velocity`` (n,), rad/s; and how that
+    falls towards the end stops, where it does."""
 
     lower: Array
     upper: Array
     velocity: Array
-    deceleration: Array
-    offset: Array
-
-    @property
-    def n(self) -> int:
-        """Number of joints."""
-        return len(self.lower)
+    braking: Braking | None
 
     def __call__(self, q: Array) -> tuple[Array, Array]:
         """Least and greatest joint velocity (n,) at ``q`` (n,), rad/s."""
-        up = np.sqrt(2.0 * self.deceleration * np.maximum(self.upper - q, TOLERANCE)) - self.offset
-        down = np.sqrt(2.0 * self.deceleration * np.maximum(q - self.lower, TOLERANCE)) - self.offset
-        return -np.clip(down, 0.0, self.velocity), np.clip(up, 0.0, self.velocity)
+        if self.braking is None:
+            return -self.velocity, self.velocity
+        low, high = self.braking.bounds(q)
+        return np.maximum(low, -self.velocity), np.minimum(high, self.velocity)
 
     def complaints(self, robot: Robot, owner: str) -> Iterator[Complaint]:
         """What ``robot`` may do in a scenario and ``owner``, the arm with these limits, cannot."""
-        if robot.n != self.n:
-            yield f"{robot.name} has {robot.n} joints, {owner} has {self.n}", "the robot for it is fr3", ("robot",)
+        if robot.n != len(self.lower):
+            yield (
+                f"{robot.name} has {robot.n} joints, {owner} has {len(self.lower)}",
+                "the robot for it is fr3",
+                ("robot",),
+            )
             return
         for i, name in enumerate(robot.joint_names):
             low, high, fast = robot.lower[i], robot.upper[i], robot.velocity_limit[i]
@@ -78,46 +77,41 @@ class ArmLimits:
                 )
 
 
-FR3 = ArmLimits(
-    lower=np.array([-2.9007, -1.8361, -2.9007, -3.077, -2.8763, 0.4398, -3.0508]),
-    upper=np.array([2.9007, 1.8361, 2.9007, -0.1169, 2.8763, 4.6216, 3.0508]),
-    velocity=np.array([2.62, 2.62, 2.62, 2.62, 5.26, 4.18, 5.26]),
-    deceleration=np.array([6.0, 2.585, 3.5, 4.0, 17.0, 5.5, 17.0]),
-    offset=np.array([0.652, 0.25, 0.2005, 0.3542, 0.5738, 0.4885, 0.4592]),
-)
-"""The limits in Franka Robotics' own description of the arm, for what is checked before one is connected."""
+@lru_cache
+def published() -> ArmLimits:
+    """The limits of the shipped robot fr3, for what is checked before an arm is connected."""
+    robot = load_robot("fr3")
+    return ArmLimits(robot.lower, robot.upper, robot.velocity_limit, robot.braking)
 
 
 def limits_of(urdf: str) -> ArmLimits:
-    """The limits in an arm's own URDF; those of :data:`FR3` where it is none."""
+    """The limits in an arm's own URDF; the published ones where it sends none."""
     try:
         joints = [j for j in ET.fromstring(urdf).iter("joint") if j.get("type") == "revolute"]
     except ET.ParseError:
-        return FR3
-    rows = [_row(joint) for joint in joints]
-    if not rows:
-        return FR3
-    return ArmLimits(*np.array(rows, dtype=np.float64).T)
+        return published()
+    if not joints:
+        return published()
 
+    def numbers(tag: str, attribute: str, default: float) -> Array:
+        found = [joint.find(tag) for joint in joints]
+        return np.array([default if x is None else float(x.get(attribute, default)) for x in found])
 
-def _row(joint: Any) -> tuple[float, float, float, float, float]:
-    def number(tag: str, attribute: str, default: float) -> float:
-        element = joint.find(tag)
-        return float(element.get(attribute, default)) if element is not None else default
-
-    braking = "position_based_velocity_limits"
-    return (
-        number("limit", "lower", -np.inf),
-        number("limit", "upper", np.inf),
-        number("limit", "velocity", np.inf),
-        number(braking, "deceleration_limit", np.inf),
-        number(braking, "velocity_offset", 0.0),
+    lower, upper = numbers("limit", "lower", -np.inf), numbers("limit", "upper", np.inf)
+    deceleration = numbers(BRAKING, "deceleration_limit", np.inf)
+    free = ~np.isfinite(deceleration)
+    braking = Braking(
+        lower=np.where(free, -np.inf, lower),
+        upper=np.where(free, np.inf, upper),
+        deceleration=np.where(free, 1.0, deceleration),
+        offset=numbers(BRAKING, "velocity_offset", 0.0),
     )
+    return ArmLimits(lower, upper, numbers("limit", "velocity", np.inf), braking)
 
 
 def complaints(config: FrankaConfig, robot: Robot, dt: float, hold: float) -> Iterator[Complaint]:
     """What a scenario asks that no Franka Research 3 can do; ``dt`` and ``hold`` are in s."""
-    yield from FR3.complaints(robot, "a Franka Research 3")
+    yield from published().complaints(robot, "a Franka Research 3")
     if dt < SHORTEST_PERIOD - TOLERANCE:
         yield (
             f"{1.0 / dt:g} Hz is more than the arm takes, {1.0 / SHORTEST_PERIOD:g} Hz",

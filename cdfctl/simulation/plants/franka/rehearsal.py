@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from cdfctl.simulation.plants.franka.arm import Sample
-from cdfctl.simulation.plants.franka.limits import FR3
+from cdfctl.simulation.plants.franka.limits import published
 from cdfctl.types import Array
 
 Sink = Callable[[float, Array, float], None]
@@ -16,11 +16,11 @@ class Rehearsal:
     """Stands in for the arm in ``--dry-run``: the integrator, on a clock that waits for nobody."""
 
     expired = 0
-    limits = FR3
 
     def __init__(self, q0: Array, sink: Sink) -> None:
         self._t, self._q, self._sink = 0.0, q0, sink
         self._u = 0.0 * q0
+        self.limits = published()
 
     def sample(self) -> Sample:
         """Where it is."""
