@@ -101,14 +101,17 @@ def figures(result: RunResult, run_dir: str, tip: str) -> list[tuple[str, str]]:
 
 
 def plant_figures(report: Report) -> list[tuple[str, str]]:
-    """What a plant reports, an entry a line; its unit is the end of its name."""
+    """What a plant reports, an entry a line, without those that are None; its unit is the end of its name."""
     kind, *entries = report.items()
     lines = [("plant", str(kind[1]))] if entries else []
     for name, value in entries:
+        if value is None:
+            continue
         suffix = next((s for s in UNITS if name.endswith(s)), "")
-        shown = "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)
+        large = isinstance(value, float) and abs(value) >= 1000.0
+        shown = str(value) if not isinstance(value, float) else f"{value:.0f}" if large else f"{value:.3g}"
         label = name.removesuffix(suffix).replace("_", " ")
-        lines.append((label, f"{shown} {UNITS[suffix]}" if suffix and value is not None else shown))
+        lines.append((label, f"{shown} {UNITS[suffix]}" if suffix else shown))
     return lines
 
 

@@ -127,3 +127,20 @@ def test_markup_in_names_is_shown_as_it_is(result):
     text = rendered(replace(result, scenario=scenario))
     assert "a [bold]name[/bold]" in text
     assert "[red]x" in text
+
+
+def test_what_the_plant_reports_has_units(result):
+    report = {"type": "mujoco", "velocity_error_max_rad_s": 0.012345, "servo_gain": 1333.27, "contact_time_s": None}
+    lines = {line.strip("│ ") for line in rendered(replace(result, plant=report)).splitlines()}
+    assert {" ".join(line.split()) for line in lines} >= {
+        "plant mujoco",
+        "velocity error max 0.0123 rad/s",
+        "servo gain 1333",
+    }
+    assert not any("contact time" in line for line in lines)
+
+
+def test_a_contact_that_only_the_plant_felt_is_told(result):
+    verdict = replace(REACHED, outcome="collision", time_to_reach=None)
+    text = rendered(replace(result, verdict=verdict, stop="contact", reason="MuJoCo finds link7 in contact with ball"))
+    assert "COLLISION: MuJoCo finds link7 in contact with ball" in text

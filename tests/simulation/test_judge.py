@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import coal
 import numpy as np
@@ -289,3 +290,25 @@ def test_path_lengths(planar):
     assert verdict.path_length == pytest.approx(4.0 * 0.3 + 2.0 * 0.4, rel=2e-5)
     assert verdict.joint_path == pytest.approx(0.7)
     assert tip_path_length(planar, q[:1]) == 0.0
+
+
+def test_what_the_plant_did_between_control_steps_is_judged(planar):
+    # At both control steps the arm lies along x; in between it swings out and back, over a ball beside it.
+    motion = Drift((Sphere(0.3), [3.9, 0.6, 0.0], [0.0, 0.0, 0.0]))
+    straight = run([[0, 0], [0, 0]])
+    assert judge(planar, motion, straight, "reached").outcome == "reached"
+    swung = replace(straight, plant_t=np.array([0.0, 0.05, 0.1]), plant_q=np.array([[0, 0], [0.3, 0.0], [0, 0]]))
+    verdict = judge(planar, motion, swung, "reached")
+    assert (verdict.outcome, verdict.outcome_sampled) == ("collision", "reached")
+    assert verdict.path_length == pytest.approx(4.0 * 0.6, rel=1e-4)
+    # 0.3 m from the ball's centre: 3.9 sin a - 0.6 cos a = -0.3, at 6 rad/s
+    angle = math.atan2(0.6, 3.9) - math.asin(0.3 / math.hypot(3.9, 0.6))
+    assert verdict.contact.time == pytest.approx(angle / 6.0, abs=1e-6)
+    np.testing.assert_allclose(clearance_curve(planar, motion, swung), clearance_curve(planar, motion, straight))
+
+
+@pytest.mark.parametrize(("stop", "outcome"), [("contact", "collision"), ("error", "error"), ("timeout", "timeout")])
+def test_what_the_plant_felt_counts(planar, stop, outcome):
+    motion = Drift((Sphere(0.3), [9.0, 9.0, 0.0], [0.0, 0.0, 0.0]))
+    verdict = judge(planar, motion, run([[0, 0], [0.1, 0]]), stop)
+    assert verdict.outcome == verdict.outcome_sampled == outcome

@@ -44,6 +44,7 @@ class MujocoPlant(Plant):
         self._built = build_model(robot, motion.shapes, config)
         self._model = self._built.model
         self._data = mujoco.MjData(self._model)
+        self._positions, self._quaternions = self._data.mocap_pos, self._data.mocap_quat  # views, for speed
         self._clear()
 
     def _clear(self) -> None:
@@ -62,7 +63,6 @@ class MujocoPlant(Plant):
         data.qpos[:] = q0
         self._place(0.0)
         mujoco.mj_step1(self._model, data)
-        self._note_contact(0.0)
         self._began = self._ended = time.perf_counter()
         return State(0.0, q0.copy())
 
@@ -76,15 +76,15 @@ class MujocoPlant(Plant):
         count, n = self._count, self._robot.n
         t, q = np.empty(count), np.empty((count, n))
         data.ctrl[:] = u
-        done = 0
+        position, done = data.qpos, 0
         while done < count and self._contact is None:
-            mujoco.mj_step2(model, data)
+            mujoco.mj_step2(model, data)  # moves on from what mj_step1 found out about the state before
             done += 1
             # Times are sums of dt, rounded as the integrator rounds them.
             now = round(state.t + dt * done / count, 12)
             self._place(now)
-            mujoco.mj_step1(model, data)
-            t[done - 1], q[done - 1] = now, data.qpos
+            mujoco.mj_step1(model, data)  # and this finds the contacts of the state reached
+            t[done - 1], q[done - 1] = now, position
             if data.ncon:
                 self._note_contact(now)
         if not np.isfinite(q[:done]).all() or any(warning.number for warning in data.warning):
@@ -133,8 +133,8 @@ class MujocoPlant(Plant):
     def _place(self, t: float) -> None:
         if len(self._motion):
             poses = self._motion.poses(t)
-            self._data.mocap_pos[:] = poses[:, :3]
-            self._data.mocap_quat[:] = poses[:, [6, 3, 4, 5]]
+            self._positions[:] = poses[:, :3]
+            self._quaternions[:, 0], self._quaternions[:, 1:] = poses[:, 6], poses[:, 3:6]  # MuJoCo's is w x y z
 
     def _note_contact(self, now: float) -> None:
         for k in range(self._data.ncon):

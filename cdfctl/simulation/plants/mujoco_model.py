@@ -82,8 +82,7 @@ def build_model(robot: Robot, shapes: Sequence[Shape], config: MujocoConfig) -> 
     spec.compiler.boundmass, spec.compiler.boundinertia = LEAST_MASS, LEAST_INERTIA
     spec.option.timestep = config.timestep
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    rotors, gains = servos(robot, config)
-    bodies, assumed = _bodies(spec, robot, rotors, config.gravity_compensation)
+    bodies, assumed = _bodies(spec, robot, config.gravity_compensation)
     owners: dict[str, int] = {}
     for i, shape in enumerate(shapes):
         body = spec.worldbody.add_body(name=f"obstacle/{i}", mocap=True)
@@ -101,29 +100,40 @@ def build_model(robot: Robot, shapes: Sequence[Shape], config: MujocoConfig) -> 
                 if other.startswith("obstacle/"):
                     spec.add_pair(geomname1=name, geomname2=other)
         owners[name] = k
-    for joint, gain in zip(robot.joint_names, gains, strict=True):
+    for joint in robot.joint_names:
         servo = spec.add_actuator(name=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=joint)
-        servo.set_to_velocity(kv=float(gain))
+        servo.set_to_velocity(kv=1.0)
     try:
         model = spec.compile()
     except ValueError as error:
         raise InputError(f"MuJoCo cannot take robot '{robot.name}': {' '.join(str(error).split())}") from None
+    gains = _add_servos(model, robot, config)
     return Built(model, gains, tuple(owners[model.geom(g).name] for g in range(model.ngeom)), assumed)
 
 
-def servos(robot: Robot, config: MujocoConfig) -> tuple[Array, Array]:
-    """The rotors' inertias (n,) and the gains kv (n,)."""
-    rng, data = np.random.default_rng(0), robot.model.createData()
+def _add_servos(model: Any, robot: Robot, config: MujocoConfig) -> Array:
+    """Give the compiled ``model`` its rotors and gains; the gains kv (n,)."""
+    rng, data = np.random.default_rng(0), mujoco.MjData(model)
     low = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
     high = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
-    looked_at = [robot.home, *rng.uniform(low, high, (SAMPLES, robot.n))]
-    diagonals = np.array([np.diag(pin.crba(robot.model, data, q)) for q in looked_at])
+    diagonals, column = np.empty((SAMPLES, robot.n)), np.zeros(robot.n)
+    for row, q in zip(diagonals, rng.uniform(low, high, (SAMPLES, robot.n)), strict=True):
+        data.qpos[:] = q
+        mujoco.mj_fwdPosition(model, data)
+        for j, unit in enumerate(np.eye(robot.n)):
+            mujoco.mj_mulM(model, data, column, unit)
+            row[j] = column[j]
     least, most = diagonals.min(axis=0), diagonals.max(axis=0)
-    M = np.maximum([most[robot.prismatic == kind].max() for kind in robot.prismatic], LEAST_INERTIA)
-    return ROTOR * M, np.minimum(M / config.servo_time, (least + ROTOR * M) / config.timestep)
+    M = np.array([most[robot.prismatic == kind].max() for kind in robot.prismatic])
+    rotors = ROTOR * M
+    gains: Array = np.minimum(M / config.servo_time, (least + rotors) / config.timestep)
+    model.dof_armature[:] = rotors
+    model.actuator_gainprm[:, 0], model.actuator_biasprm[:, 2] = gains, -gains
+    mujoco.mj_setConst(model, data)
+    return gains
 
 
-def _bodies(spec: Any, robot: Robot, rotors: Array, compensation: float) -> tuple[list[Any], tuple[str, ...]]:
+def _bodies(spec: Any, robot: Robot, compensation: float) -> tuple[list[Any], tuple[str, ...]]:
     """The bodies by Pinocchio's joint number (0 is the world), each with its joint and inertia."""
     chain, model = robot.chain, robot.model
     bodies, assumed = [spec.worldbody], []
@@ -136,7 +146,7 @@ def _bodies(spec: Any, robot: Robot, rotors: Array, compensation: float) -> tupl
             gravcomp=compensation,
         )
         kind = mujoco.mjtJoint.mjJNT_SLIDE if chain.prismatic[i] else mujoco.mjtJoint.mjJNT_HINGE
-        joint = body.add_joint(name=name, type=kind, axis=chain.axis[i], armature=rotors[i], actgravcomp=True)
+        joint = body.add_joint(name=name, type=kind, axis=chain.axis[i], actgravcomp=True)
         if np.isfinite(chain.lower[i]) and np.isfinite(chain.upper[i]):
             joint.limited, joint.range = mujoco.mjtLimited.mjLIMITED_TRUE, [chain.lower[i], chain.upper[i]]
         effort = float(model.effortLimit[i])
@@ -158,8 +168,9 @@ def _set_inertia(body: Any, inertia: Any, where: str) -> bool:
     if np.linalg.eigvalsh(tensor).min() < -1e-9:
         raise InputError(f"{where} has an inertia that is none: a negative principal moment")
     body.mass, body.ipos, body.explicitinertial = mass, lever, True
-    # Below what MuJoCo takes for positive definite: a point mass, a thin rod.
-    tensor = tensor + max(0.0, LEAST_INERTIA - np.linalg.eigvalsh(tensor).min()) * np.eye(3)
+    # A point mass or a thin rod is not positive definite, as MuJoCo wants it.
+    moments, axes = np.linalg.eigh(tensor)
+    tensor = (axes * np.maximum(moments, LEAST_INERTIA)) @ axes.T
     body.fullinertia = tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     return True
 
