@@ -8,6 +8,7 @@ from typing import Any
 
 from cdfctl.benchmark.paper import Printed, printed
 from cdfctl.benchmark.plan import Plan
+from cdfctl.benchmark.solvable.trials import Share
 from cdfctl.benchmark.statistics import CellSummary
 from cdfctl.benchmark.versions import versions
 
@@ -19,7 +20,8 @@ def paper_cell(summary: CellSummary) -> Printed | None:
 
 def document(plan: Plan, summaries: Sequence[CellSummary]) -> dict[str, Any]:
     """The document of ``bench --json``. Where a benchmark has several rules for infeasible steps, or sweeps a field,
-    each result also says which it is: ``on_infeasible``, ``sweep``."""
+    each result also says which it is: ``on_infeasible``, ``sweep``. Where it was asked what can be solved, ``solvable``
+    says so."""
     several = len({cell.on_infeasible for cell in plan.cells}) > 1
     results = []
     for summary in summaries:
@@ -28,6 +30,8 @@ def document(plan: Plan, summaries: Sequence[CellSummary]) -> dict[str, Any]:
             result["on_infeasible"] = summary.cell.on_infeasible
         if summary.cell.settings:
             result["sweep"] = {setting.field: setting.override.value for setting in summary.cell.settings}
+        if summary.share is not None:
+            result["solvable"] = _share(summary.share)
         results.append(result)
     return {"trials": plan.trials, "seed": plan.seed, "results": results}
 
@@ -46,6 +50,18 @@ def full_document(plan: Plan, summaries: Sequence[CellSummary]) -> dict[str, Any
             "assumptions": list(summary.cell.scenario.assumptions),
         }
     return {"format": "cdfctl-bench-summary", "version": 1, "suite": plan.suite, **short, "versions": versions()}
+
+
+def _share(share: Share) -> dict[str, Any]:
+    return {
+        "trials": share.trials,
+        "share": list(share.bounds),
+        "success_of_solvable": list(share.of_solvable),
+        "yes": list(share.yes),
+        "no": list(share.no),
+        "open": list(share.open),
+        "missed": list(share.missed),
+    }
 
 
 def _result(summary: CellSummary) -> dict[str, Any]:

@@ -61,6 +61,11 @@ class Cell:
         """The rule for steps that no velocity satisfies."""
         return str(self.scenario.controller.on_infeasible)
 
+    @property
+    def identity(self) -> tuple[str, str, str]:
+        """What tells it from the other cells of its plan: name, controller, rule."""
+        return self.name, self.controller, self.on_infeasible
+
     def key(self, trial: int) -> TrialKey:
         """The key of one of its trials."""
         return TrialKey(self.name, self.controller, self.on_infeasible, self.scenario.seed, trial)
@@ -154,7 +159,7 @@ def make_plan(
                 robots[place] = wired.robot
                 as_shipped = "/" not in source and not Path(source).suffix and not settings and not overrides
                 cell = Cell(resolve(file.scenario), settings, as_shipped, table_mark(file.scenario, wired.robot))
-                same = cells.setdefault((cell.name, cell.controller, cell.on_infeasible), cell)
+                same = cells.setdefault(cell.identity, cell)
                 if same.scenario != cell.scenario:
                     raise InputError(f"two scenarios are called '{cell.name}'", "give one of them another name")
     names = list(dict.fromkeys(cell.scenario.name for cell in cells.values()))

@@ -14,8 +14,11 @@ from typing import Any
 
 import joblib
 
-from cdfctl.benchmark.plan import Plan
+from cdfctl.benchmark.plan import Cell, Plan
+from cdfctl.benchmark.solvable.trials import Record
+from cdfctl.benchmark.solvable.trials import answer as solvable_answer
 from cdfctl.benchmark.trial import Answer, Keep, failed, run_trial
+from cdfctl.errors import CdfctlError
 
 DIED = "the worker process died twice in this trial"
 
@@ -66,14 +69,28 @@ class Runner:
 
     def _parallel(self, places: Sequence[int]) -> Any:
         """A generator of (place, answer), in the order in which they come."""
+        # One trial a task: what is sent ahead is what a death can take along.
+        return self._workers("generator_unordered")(self._tasks(places))
+
+    def solve(self, questions: Sequence[tuple[Cell, int]]) -> Generator[Record, None, None]:
+        """What is proved of these set-ups (see :mod:`cdfctl.benchmark.solvable`), in order.
+
+        Raises:
+            CdfctlError: a worker died.
+        """
+        try:
+            with closing(self._workers("generator")(joblib.delayed(solvable_answer)(*q) for q in questions)) as found:
+                yield from found
+        except BrokenExecutor:
+            raise CdfctlError("a worker process died", "the same command goes on from there") from None
+
+    def _workers(self, order: str) -> Any:
         if self.cluster is not None:
             backend, jobs = joblib.parallel_config(backend="dask", client=self.cluster), -1
         else:
             backend, jobs = joblib.parallel_config(backend="loky", inner_max_num_threads=1), self.jobs
         with backend:
-            # One trial a task: what is sent ahead is what a death can take along.
-            parallel = joblib.Parallel(jobs, return_as="generator_unordered", batch_size=1, pre_dispatch="2*n_jobs")
-        return parallel(self._tasks(places))
+            return joblib.Parallel(jobs, return_as=order, batch_size=1, pre_dispatch="2*n_jobs")
 
     def _tasks(self, places: Sequence[int]) -> Iterator[Any]:
         for place in places:

@@ -7,11 +7,12 @@ paired trials: of the trials that only one of two methods solved, is the split w
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cdfctl.benchmark.plan import Cell
+from cdfctl.benchmark.solvable.trials import Share, shares
 from cdfctl.benchmark.store import Record
 from cdfctl.types import OUTCOMES
 
@@ -69,6 +70,7 @@ class CellSummary:
         infeasible_trials, infeasible_steps: trials with a step that no velocity satisfied, and all such steps.
         step_ms: median and 99 % of all control steps, ms; None where no time was kept.
         p_value: of McNemar's test against the first method of the scenario, None for that one.
+        share: of its trials that can be solved at all, None where that was not asked.
     """
 
     cell: Cell
@@ -85,6 +87,7 @@ class CellSummary:
     infeasible_steps: int
     step_ms: tuple[float | None, float | None]
     p_value: float | None
+    share: Share | None = None
 
     @property
     def success_rate(self) -> float:
@@ -97,26 +100,30 @@ class CellSummary:
         return self.successes_sampled / self.trials
 
 
-def summarise(cells: Sequence[Cell], records: Sequence[Record], timings: Sequence[Record]) -> list[CellSummary]:
-    """A summary of every cell that has trials, in order. ``records`` and ``timings`` are lines of the store; compared
-    are the trials that both of two cells have."""
+def summarise(
+    cells: Sequence[Cell], records: Sequence[Record], timings: Sequence[Record], solvable: Sequence[Record] = ()
+) -> list[CellSummary]:
+    """A summary of every cell that has trials, in order. ``records``, ``timings`` and ``solvable`` are lines of the
+    store; compared are the trials that both of two cells have."""
     groups: dict[tuple[str, str, str], list[Record]] = {}
     for record in records:
         groups.setdefault(_cell_key(record), []).append(record)
     times: dict[tuple[str, str, str], dict[int, list[int]]] = {}
     for line in timings:
         times.setdefault(_cell_key(line), {})[line["trial"]] = line["step_us"]  # a trial run again: the last time
+    solved = {key: {record["trial"]: _reached(record) for record in group} for key, group in groups.items()}
+    share = shares(cells, solvable, solved)
     first: dict[tuple[str, str], list[Record]] = {}
     summaries = []
     for cell in cells:
-        key = (cell.name, cell.controller, cell.on_infeasible)
+        key = cell.identity
         own = groups.get(key, [])
         if not own:
             continue
         reference = first.setdefault((cell.name, cell.on_infeasible), own)
         p_value = None if reference is own else _paired(reference, own)
         steps = [step for trial in times.get(key, {}).values() for step in trial]
-        summaries.append(_summary(cell, own, steps, p_value))
+        summaries.append(replace(_summary(cell, own, steps, p_value), share=share.get(key)))
     return summaries
 
 

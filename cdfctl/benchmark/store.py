@@ -4,6 +4,7 @@
     trials.jsonl      one line a trial, in the order of the plan; deterministic columns only
     arrived.jsonl     trials that finished before their turn; gone when the benchmark is complete
     timing.jsonl      one line a trial, as they came: times, which no two runs share
+    solvable.jsonl    one line a set-up that was asked about (--solvable): what is proved of it
     trajectories/     run folders of the trials that are kept
     summary.json, summary.md
 
@@ -34,6 +35,7 @@ VERSION = 1
 """The version of the store this code writes, and the newest it reads."""
 
 MANIFEST, TRIALS, ARRIVED, TIMING, LOCK = "manifest.json", "trials.jsonl", "arrived.jsonl", "timing.jsonl", ".lock"
+SOLVABLE = "solvable.jsonl"
 
 Record = dict[str, Any]
 
@@ -100,6 +102,14 @@ class Store:
         """The lines of ``timing.jsonl``."""
         return read_lines(self.folder / TIMING)
 
+    def solvable(self) -> list[Record]:
+        """The lines of ``solvable.jsonl``."""
+        return read_lines(self.folder / SOLVABLE)
+
+    def add_solvable(self, record: Record) -> None:
+        """Keep what is proved of one set-up. Raises :class:`InputError` as :meth:`add`."""
+        _append(self.folder / SOLVABLE, [record])
+
     def write(self, name: str, text: str) -> None:
         """Write a file of the store whole or not at all. Raises :class:`InputError` where the disk does not take it."""
         _replace(self.folder / name, text)
@@ -144,7 +154,7 @@ def open_store(folder: Path, plan: Plan) -> Iterator[Store]:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             raise InputError(f"{folder}: another bench is writing to this store", "wait for it, or use --out") from None
-        for name in (TRIALS, ARRIVED, TIMING):
+        for name in (TRIALS, ARRIVED, TIMING, SOLVABLE):
             _drop_torn(folder / name)
         keys = list(plan.keys())
         records, early = _read(folder, keys)
@@ -161,6 +171,9 @@ def _manifest(plan: Plan, keys: int) -> dict[str, Any]:
         "suite": plan.suite,
         "trials": keys // len(plan.cells),
         "configuration": plan.configuration(),
+        "cells": [
+            {"sweep": {s.field: s.text for s in cell.settings}, "shipped": cell.shipped} for cell in plan.cells
+        ],
         "versions": versions(),
     }
 
@@ -228,7 +241,9 @@ def read_lines(path: Path) -> list[Record]:
     for number, line in enumerate(text.split("\n")[:-1], start=1):
         try:
             record = json.loads(line)
-            if path.name != TIMING:
+            if path.name == SOLVABLE:
+                record["problem"], record["trial"], record["answer"]
+            elif path.name != TIMING:
                 key_of(record)
         except (ValueError, TypeError, KeyError):
             raise InputError(f"{path}:{number}: damaged: not a trial", "use another --out") from None

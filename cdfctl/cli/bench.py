@@ -88,6 +88,10 @@ def bench(
             show_default=False,
         ),
     ] = None,
+    solvable: Annotated[
+        bool,
+        typer.Option("--solvable", help="Also bound the share of trials that can be solved at all; two joints only."),
+    ] = False,
     jobs: Annotated[
         int | None,
         typer.Option("--jobs", min=1, help="Worker processes. [default: one a processor]", show_default=False),
@@ -134,6 +138,11 @@ def bench(
         suite=suite.value if suite else None,
         overrides=options.overrides(settings, None, None),
     )
+    if solvable:
+        from cdfctl.benchmark.solvable.trials import check_solvable
+
+        for cell in plan.cells:
+            check_solvable(cell.scenario)
     from cdfctl.benchmark.run import Runner, processors
     from cdfctl.benchmark.store import default_store, open_store
 
@@ -149,6 +158,8 @@ def bench(
         store = stack.enter_context(open_store(folder, plan))
         runner = Runner(plan, jobs or processors(), keep.value, client)
         finished = _follow(runner, store, quiet=quiet or json)
+        if solvable and finished:
+            finished = _bound(runner, store, quiet=quiet or json)
         summaries = _summarise(plan, store)
     if json:
         from cdfctl.benchmark.document import document
@@ -212,6 +223,28 @@ def _follow(runner: Runner, store: Store, *, quiet: bool) -> bool:
         answers.close()
 
 
+def _bound(runner: Runner, store: Store, *, quiet: bool) -> bool:
+    """Find out what can be solved, of the set-ups not known yet; False if interrupted on the way."""
+    from cdfctl.benchmark.solvable.trials import questions
+
+    waiting = questions(runner.plan, store.solvable())
+    found = runner.solve(waiting)
+    try:
+        if quiet or not sys.stderr.isatty():
+            for record in found:
+                store.add_solvable(record)
+            return True
+        from rich.progress import track
+
+        for record in track(found, "what can be solved", len(waiting), console=stderr(), transient=True):
+            store.add_solvable(record)
+        return True
+    except KeyboardInterrupt:
+        return False
+    finally:
+        found.close()
+
+
 def _summarise(plan: Plan, store: Store) -> list[CellSummary]:
     """Statistics of all trials there are, also written into the store."""
     import json as json_module
@@ -224,7 +257,7 @@ def _summarise(plan: Plan, store: Store) -> list[CellSummary]:
     from cdfctl.benchmark.store import key_of
 
     records = [r for r in [*store.records, *store.early.values()] if key_of(r) in wanted]
-    summaries = summarise(plan.cells, records, store.timings())
+    summaries = summarise(plan.cells, records, store.timings(), store.solvable())
     store.write("summary.json", json_module.dumps(full_document(plan, summaries), indent=2, allow_nan=False) + "\n")
     store.write("summary.md", markdown(summaries))
     return summaries

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from cdfctl.benchmark.document import paper_cell
@@ -14,9 +14,13 @@ PAPER = "paper"
 IMPOSSIBLE, INCOMPARABLE = "*", "+"
 """Marks behind a printed figure: it cannot be as printed; it does not mean what ours does."""
 
+MOST_SHOWN = 20
+"""Trials named in a note; the rest is counted."""
+
 COLUMNS: Mapping[str, str] = {
     "success": "success",
     "ci95": "95 %",
+    "solvable": "of solvable",
     "sampled": "sampled",
     "p": "p",
     "collided": "hit",
@@ -75,6 +79,16 @@ def groups(summaries: Sequence[CellSummary]) -> list[Group]:
     return [Group(f"{name}, on infeasible steps: {rule}", tuple(lines)) for (name, rule), lines in found.items()]
 
 
+def shown(group: Group, columns: Iterable[str]) -> list[str]:
+    """Which of some columns have something to say: errors only where there are some, the solvable where asked."""
+    absent = {"error": "0", "solvable": ""}
+    return [
+        c
+        for c in columns
+        if c not in absent or any(line.cells.get(c, "") not in ("", absent[c]) for line in group.lines)
+    ]
+
+
 def ours(summary: CellSummary) -> dict[str, str]:
     """Our cells."""
     low, high = summary.ci95
@@ -82,6 +96,7 @@ def ours(summary: CellSummary) -> dict[str, str]:
     return {
         "success": f"{summary.successes}/{summary.trials}",
         "ci95": f"{low:.2f}-{high:.2f}",
+        **({} if summary.share is None else {"solvable": interval(summary.share.of_solvable)}),
         "sampled": f"{summary.successes_sampled}/{summary.trials}",
         "p": "-" if summary.p_value is None else probability(summary.p_value),
         "collided": str(summary.outcomes["collision"]),
@@ -114,6 +129,30 @@ def spread(value: Spread, digits: int) -> str:
         return "-"
     mean = f"{value.mean:.{digits}f}"
     return mean if value.min is None else f"{mean} ({value.min:.{digits}f}-{value.max:.{digits}f})"
+
+
+def interval(bounds: tuple[float | None, float | None]) -> str:
+    """Two rates, or one where they are the same to two digits."""
+    low, high = ("-" if rate is None else f"{rate:.2f}" for rate in bounds)
+    return low if low == high else f"{low}-{high}"
+
+
+def solvable(summaries: Sequence[CellSummary]) -> list[str]:
+    """What can be solved of each scenario, and the solvable trials that each controller failed."""
+    found, said = [], set()
+    for summary in summaries:
+        share, cell = summary.share, summary.cell
+        if share is None:
+            continue
+        if cell.name not in said:
+            said.add(cell.name)
+            bounds = interval(share.bounds)
+            proofs = f"{len(share.yes)} solved, {len(share.no)} proved impossible, {len(share.open)} open"
+            found.append(f"{cell.name}: solvable share {bounds} ({proofs}).")
+        missed = ", ".join(str(i) for i in share.missed[:MOST_SHOWN]) or "none"
+        more = f" and {len(share.missed) - MOST_SHOWN} more" if len(share.missed) > MOST_SHOWN else ""
+        found.append(f"{cell.name} {cell.controller} ({cell.on_infeasible}): solvable but failed: {missed}{more}.")
+    return found
 
 
 def triple(value: Triple | None, digits: int) -> str:

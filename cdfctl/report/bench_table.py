@@ -12,7 +12,7 @@ from cdfctl.benchmark.statistics import CellSummary
 from cdfctl.report import bench_rows as rows
 from cdfctl.report.tables import bullets
 
-SUCCESS = ("success", "ci95", "sampled", "p", "collided", "timeout", "infeasible", "error")
+SUCCESS = ("success", "ci95", "solvable", "sampled", "p", "collided", "timeout", "infeasible", "error")
 MOTION = ("time", "joint_path", "path", "clearance")
 STEPS = ("infeasible_trials", "infeasible_steps", "p50", "p99")
 
@@ -25,7 +25,12 @@ def bench_table(summaries: Sequence[CellSummary]) -> RenderableType:
         parts += [_table(group, columns) for columns in (SUCCESS, MOTION, STEPS)]
         parts.append(Text())
     parts.append(bullets(rows.LEGEND))
-    for heading, items in (("The paper", rows.notes(summaries)), ("Assumed", rows.assumptions(summaries))):
+    notes = (
+        ("What can be solved", rows.solvable(summaries)),
+        ("The paper", rows.notes(summaries)),
+        ("Assumed", rows.assumptions(summaries)),
+    )
+    for heading, items in notes:
         if items:
             parts += [Text(heading, style="bold"), bullets(items)]
     return Group(*parts)
@@ -34,7 +39,7 @@ def bench_table(summaries: Sequence[CellSummary]) -> RenderableType:
 def _table(group: rows.Group, columns: Sequence[str]) -> Table:
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="dim")
     table.add_column("", overflow="fold", min_width=14)
-    shown = [c for c in columns if c != "error" or any(line.cells.get(c, "0") != "0" for line in group.lines)]
+    shown = rows.shown(group, columns)
     for column in shown:
         table.add_column(rows.COLUMNS[column], justify="right", no_wrap=True)
     for line in group.lines:

@@ -26,7 +26,7 @@ def markdown(summaries: Sequence[CellSummary]) -> str:
             cells = (line.cells.get(column, "").replace("*", r"\*").replace("<", r"\<") for column in shown)
             parts.append(f"| {title} | " + " | ".join(cells) + " |")
         parts.append("")
-    for items in (rows.LEGEND, rows.notes(summaries), rows.assumptions(summaries)):
+    for items in (rows.LEGEND, rows.solvable(summaries), rows.notes(summaries), rows.assumptions(summaries)):
         parts += [f"- {item.replace('*', chr(92) + '*').replace('+ ', chr(92) + '+ ')}" for item in items]
         parts += [""] * bool(items)
     return "\n".join(parts).rstrip() + "\n"
@@ -43,7 +43,7 @@ def latex(summaries: Sequence[CellSummary]) -> str:
         for line in group.lines:
             parts.append(_latex_row([line.title, *(line.cells.get(column, "") for column in shown)]))
         parts += [r"\bottomrule", r"\end{tabular}", ""]
-    for items in (rows.LEGEND, rows.notes(summaries), rows.assumptions(summaries)):
+    for items in (rows.LEGEND, rows.solvable(summaries), rows.notes(summaries), rows.assumptions(summaries)):
         parts += [f"% {item}" for item in items]
     return "\n".join(parts) + "\n"
 
@@ -72,6 +72,8 @@ def _csv_cells(summary: CellSummary) -> Iterator[tuple[str, object]]:
     ):
         yield from ((f"{name}_{part}", getattr(spread, part)) for part in ("min", "max", "mean"))
     yield "min_clearance_m", summary.min_clearance
+    share = summary.share
+    yield from zip(("solvable_low", "solvable_high"), share.bounds if share else (None, None), strict=True)
     yield from (
         ("trials_with_infeasible_steps", summary.infeasible_trials),
         ("infeasible_steps", summary.infeasible_steps),
@@ -86,7 +88,7 @@ def _csv_cells(summary: CellSummary) -> Iterator[tuple[str, object]]:
 
 
 def _shown(group: rows.Group) -> list[str]:
-    return [c for c in rows.COLUMNS if c != "error" or any(line.cells.get(c, "0") != "0" for line in group.lines)]
+    return rows.shown(group, rows.COLUMNS)
 
 
 def _latex_row(cells: Sequence[str]) -> str:

@@ -131,3 +131,33 @@ def test_bad_input_is_said_before_anything_is_written(cli, here: Path, arguments
     assert words in result.err
     assert "Traceback" not in result.err
     assert list(here.iterdir()) == []
+
+
+def test_what_can_be_solved_is_asked_once_and_shown(cli, small: Path):
+    document = cli("bench", *ONE, "--json", "--solvable").document()
+    (result,) = document["results"]
+    assert set(result) == KEYS | {"solvable"}
+    assert result["solvable"] | {"success_of_solvable": None} == {
+        "trials": 2,
+        "share": [1.0, 1.0],
+        "success_of_solvable": None,
+        "yes": [0, 1],
+        "no": [],
+        "open": [],
+        "missed": [],
+    }
+    (store,) = (small.parent / "runs").iterdir()
+    lines = (store / "solvable.jsonl").read_bytes()
+    shown = cli("bench", *ONE[:-1], "3", "--solvable")
+    assert "of solvable" in shown.out
+    assert "small: solvable share 1.00 (3 solved, 0 proved impossible, 0 open)." in shown.out
+    assert (store / "solvable.jsonl").read_bytes().startswith(lines)
+    assert len((store / "solvable.jsonl").read_text().splitlines()) == 3
+    assert max(map(len, shown.out.splitlines())) <= 80
+
+
+def test_what_cannot_be_bounded(cli, here: Path):
+    result = cli("bench", "--scenario", "X3", "--trials", "1", "--solvable")
+    assert (result.status, result.out) == (2, "")
+    assert "--solvable needs a robot with two joints; that of 'X3' has 7" in result.err
+    assert not (here / "runs").exists()
