@@ -261,6 +261,23 @@ class FieldQuery:
 
 
 @dataclass(frozen=True)
+class SelfQuery:
+    """The nearest pairs of a robot's own bodies, k rows, nearest first.
+
+    Attributes:
+        pair: (k,) index into the pairs of :class:`cdfctl.fields.self_distance.SelfDistance`.
+        d: (k,) signed distance, m, negative in penetration.
+        dq: (k, n) derivative of d with respect to q, m/rad (m/m for a prismatic joint).
+        valid: (k,) False where the derivative is undefined or no joint can change d.
+    """
+
+    pair: IntArray
+    d: Array
+    dq: Array
+    valid: BoolArray
+
+
+@dataclass(frozen=True)
 class Rows:
     """Linear constraints ``G u - delta * slack <= rhs``: the one sign convention of the whole code.
 
@@ -298,6 +315,12 @@ class Decision:
         V: Lyapunov function, NaN without one.
         plan_q: (K, n) configurations between which the plan moves straight, the first is q; None without a planner.
         plan_t: (K,) s from now, when it is there; a shorter plan ends in NaN, in both.
+        h_self: (k,) barrier values of the nearest pairs of the robot's own links, nearest first, m; None where
+            self-collision is not looked at.
+        self_pair: the links of the nearest such pair, None without one.
+        active: what holds the command, in words: ``ball near panda_link5``, ``panda_link2 near panda_hand``,
+            ``bound of panda_joint4``.
+        reason: why it brakes, where that is not for want of a velocity that satisfies the rows.
     """
 
     u: Array
@@ -311,6 +334,10 @@ class Decision:
     V: float = float("nan")
     plan_q: Array | None = None
     plan_t: Array | None = None
+    h_self: Array | None = None
+    self_pair: tuple[str, str] | None = None
+    active: tuple[str, ...] = ()
+    reason: str | None = None
 
 
 @dataclass(frozen=True)

@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from cdfctl.control.parameters import Parameters
 from cdfctl.control.qp import StepQP
-from cdfctl.control.rows import cbf_rows, hyperplane_rows, joint_limit_box, stack, tvcbf_rows
+from cdfctl.control.rows import (
+    acceleration_box,
+    cbf_rows,
+    hyperplane_rows,
+    joint_limit_box,
+    self_collision_rows,
+    stack,
+    tvcbf_rows,
+    usable,
+)
+from cdfctl.control.solvers import TOLERANCE
 from cdfctl.errors import InputError
 from cdfctl.fields.field import Field, make_field
+from cdfctl.fields.self_distance import SelfDistance
 from cdfctl.robots.robot import Robot
 from cdfctl.scenario.variants import FieldKind, Variant
-from cdfctl.types import Array, Decision, FieldQuery, Rows, Scene
+from cdfctl.types import Array, Decision, FieldQuery, IntArray, Rows, Scene, SelfQuery
 
 # The fields a variant asks, the one whose barrier is reported as h first.
 FIELDS_OF: Mapping[FieldKind, tuple[str, ...]] = {"sdf": ("sdf",), "cdf": ("cdf",), "dual": ("cdf", "sdf")}
@@ -32,7 +43,7 @@ class RowSource:
 class Core:
     """Velocities that keep a robot clear of a moving scene, as near as can be to those asked for.
 
-    It keeps the field's warm starts and ``u_last`` from step to step: one instance a loop.
+    It keeps the field's warm starts and the last command, ``u_last`` (n,), from step to step: one instance a loop.
     """
 
     def __init__(self, robot: Robot, variant: Variant, parameters: Parameters, dt: float) -> None:
@@ -45,6 +56,7 @@ class Core:
             if isinstance(weight, tuple) and len(weight) != n:
                 raise InputError(f"{name} must be one number or {n}, one a joint, found {len(weight)}")
         self.robot, self.variant, self.parameters, self.dt = robot, variant, parameters, dt
+        p = parameters
         self._sources: Sequence[RowSource] = [
             _source(name, robot, variant, parameters, dt) for name in FIELDS_OF[variant.field]
         ]
@@ -57,19 +69,29 @@ class Core:
             on_infeasible=parameters.on_infeasible,
             solver=parameters.solver,
         )
-        self._u_last = np.zeros(n)
+        own = SelfDistance(robot, p.self_collision, p.self_collision_margin) if p.self_collision else None
+        self._own = own if own is not None and own.most else None
+        self._accelerates_freely = bool(np.isinf(robot.acceleration_limit).all())
+        self.u_last = np.zeros(n)
 
     def reset(self) -> None:
-        """Forget the steps so far."""
-        self._u_last = np.zeros(self.robot.n)
+        """Forget the steps so far; the robot stands."""
+        self.u_last = np.zeros(self.robot.n)
         for source in self._sources:
             source.field.reset()
+        if self._own is not None:
+            self._own.reset()
 
     def follow(self, q: Array, scene: Scene, u: Array) -> Decision:
-        """``u`` (n,) as the command, no row asked; what is reported is that of :meth:`step`."""
-        self._u_last = u
+        """``u`` (n,) as the command, no row of an obstacle asked; what is reported is that of :meth:`step`.
+
+        Only what a plan knows nothing of may change it: acceleration limits and the robot's own links.
+        """
         h = least_barrier(self._sources[0].ask(q, scene), len(scene), self.parameters.margin)
-        return Decision(u=u, h=h, slack=float("nan"), status="optimal", infeasible=False, residual=0.0)
+        if self._accelerates_freely and self._own is None:
+            self.u_last = u.copy()
+            return Decision(u=u, h=h, slack=float("nan"), status="optimal", infeasible=False, residual=0.0)
+        return self._decide(q, scene, u, h, [], [])
 
     def step(self, q: Array, scene: Scene, u_ref: Array, task: Rows | None = None) -> Decision:
         """The command at configuration ``q`` (n,) in ``scene``, as near as can be to ``u_ref`` (n,), rad/s.
@@ -80,26 +102,85 @@ class Core:
         Raises:
             InputError: a pose or velocity of ``scene`` is not finite.
         """
-        robot, p = self.robot, self.parameters
+        p = self.parameters
         check_scene(scene)
         answers = [source.ask(q, scene) for source in self._sources]
         parts = [source.rows(a) for source, a in zip(self._sources, answers, strict=True)]
-        rows = stack(parts if task is None else [*parts, task], robot.n)
-        slowest, fastest = robot.velocity_bounds(q, self.dt)
-        low, high = joint_limit_box(q, robot.lower, robot.upper, slowest, fastest, p.limit_alpha)
-        command = self._qp.solve(u_ref, self._u_last, rows, low, high)
-        self._u_last = command.u
-        first = answers[0]
+        if task is not None:
+            parts.append(task)
+        h = least_barrier(answers[0], len(scene), p.margin)
+        return self._decide(q, scene, u_ref, h, answers, parts)
+
+    def _decide(
+        self, q: Array, scene: Scene, u_ref: Array, h: Array, answers: Sequence[FieldQuery], parts: Sequence[Rows]
+    ) -> Decision:
+        """The command nearest to ``u_ref`` within the box, under ``parts`` and the rows of the robot's own links.
+
+        ``parts`` begin with those of ``answers``, in order.
+        """
+        p, m = self.parameters, len(scene)
+        near = self._own.query(q) if self._own is not None else None
+        own = [] if near is None else [self_collision_rows(near, p.alpha, p.self_collision_margin)]
+        low, high = self._box(q)
+        command = self._qp.solve(u_ref, self.u_last, stack([*own, *parts], self.robot.n), low, high)
+        self.u_last = command.u.copy()  # the caller may change the one it gets
+        holders = self._holders(command.tight, near, answers, scene)
         return Decision(
             u=command.u,
-            h=least_barrier(first, len(scene), p.margin),
+            h=h,
             slack=command.slack,
             status=command.status,
             infeasible=command.infeasible,
             residual=command.residual,
-            h_sdf=least_barrier(answers[1], len(scene), p.margin) if len(answers) > 1 else None,
-            contact_q=nearest_contact(first, len(scene)) if first.unit == "rad" else None,
+            h_sdf=least_barrier(answers[1], m, p.margin) if len(answers) > 1 else None,
+            contact_q=nearest_contact(answers[0], m) if answers and answers[0].unit == "rad" else None,
+            h_self=near.d - p.self_collision_margin if near is not None else None,
+            self_pair=self._own.links[near.pair[0]] if self._own is not None and near is not None else None,
+            active=(*holders, *self._bounds(command.u, u_ref, low, high)),
         )
+
+    def brake(self) -> Array:
+        """Standstill, or the nearest to it that the acceleration limits allow: a command (n,) without a look at the
+        scene."""
+        step = self.robot.acceleration_limit * self.dt
+        self.u_last = self.u_last - np.minimum(np.maximum(self.u_last, -step), step)
+        return self.u_last.copy()
+
+    def _box(self, q: Array) -> tuple[Array, Array]:
+        """The velocity bounds (n,) at ``q``: joint limits, velocity limits, acceleration limits."""
+        robot = self.robot
+        slowest, fastest = robot.velocity_bounds(q, self.dt)
+        low, high = joint_limit_box(q, robot.lower, robot.upper, slowest, fastest, self.parameters.limit_alpha)
+        if self._accelerates_freely:
+            return low, high
+        below, above, limit = q - robot.lower, robot.upper - q, robot.acceleration_limit
+        return acceleration_box(low, high, below, above, self.u_last, limit, self.dt)
+
+    def _holders(
+        self, tight: IntArray, near: SelfQuery | None, answers: Sequence[FieldQuery], scene: Scene
+    ) -> Iterable[str]:
+        """The rows ``tight`` in words, each once; the task's are left out."""
+        found: dict[str, None] = {}
+        start = 0
+        if near is not None and self._own is not None:
+            pairs = near.pair[near.valid]
+            for row in tight[tight < len(pairs)]:
+                found[" near ".join(self._own.links[pairs[row]])] = None
+            start = len(pairs)
+        for answer in answers:
+            mask = usable(answer)
+            end = start + int(mask.sum())
+            own = tight[(tight >= start) & (tight < end)] - start
+            if own.size:
+                for row in np.flatnonzero(mask)[own]:
+                    found[f"{scene.names[answer.obstacle[row]]} near {self.robot.links[answer.link[row]]}"] = None
+            start = end
+        return found
+
+    def _bounds(self, u: Array, u_ref: Array, low: Array, high: Array) -> Iterable[str]:
+        """The joints whose bounds keep ``u`` from ``u_ref``, in words."""
+        held = ((u <= low + TOLERANCE) & (u_ref < u)) | ((u >= high - TOLERANCE) & (u_ref > u))
+        return [f"bound of {self.robot.joint_names[j]}" for j in np.flatnonzero(held)]
 
 
 def core_of(robot: Robot, variant: Variant, parameters: Parameters, dt: float) -> Core:

@@ -29,6 +29,8 @@ class Parameters:
     violation_weight: float
     hyperplane_offset: float
     limit_alpha: float
+    self_collision: int
+    self_collision_margin: float
     links: Literal["nearest", "all"]
     sheets: int
     on_infeasible: OnInfeasible

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from cdfctl.control.solvers import TOLERANCE, Problem, check_solver, solve
 from cdfctl.errors import InputError
-from cdfctl.types import Array, BoolArray, DecisionStatus, Rows
+from cdfctl.types import Array, BoolArray, DecisionStatus, IntArray, Rows
 
 OnInfeasible = Literal["fail", "least-violation", "brake"]
 
@@ -32,13 +32,15 @@ FLAT = 1e-6
 @dataclass(frozen=True)
 class Command:
     """The answer of one step: ``u`` (n,), the Lyapunov ``slack`` (NaN without such a row), what was done (``status``),
-    whether no u satisfies all rows (``infeasible``), and the greatest violation of a row by the returned u."""
+    whether no u satisfies all rows (``infeasible``), the greatest violation of a row by the returned u, and which rows
+    hold it: those that u meets with equality or not at all."""
 
     u: Array
     slack: float
     status: DecisionStatus
     infeasible: bool
     residual: float
+    tight: IntArray
 
 
 class _Reach(NamedTuple):
@@ -104,6 +106,7 @@ class StepQP:
             status=status,
             infeasible=status != "optimal",
             residual=max(0.0, float(excess.max())) if excess.shape[0] else 0.0,
+            tight=np.flatnonzero(excess >= -TOLERANCE),
         )
 
     def _cost(self, u_ref: Array, u_last: Array, variables: int, has_slack: bool) -> tuple[Array, Array]:

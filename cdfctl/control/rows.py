@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cdfctl.types import Array, BoolArray, FieldQuery, Rows
+from cdfctl.types import Array, BoolArray, FieldQuery, Rows, SelfQuery
 
 
 def usable(query: FieldQuery) -> BoolArray:
@@ -71,6 +71,22 @@ def hyperplane_rows(query: FieldQuery, offset: float, dt: float) -> Rows:
     return _soft_rows("hyperplane", -query.dq[k] * dt, logarithm)
 
 
+def self_collision_rows(query: SelfQuery, alpha: float, margin: float) -> Rows:
+    """The robot keeps off itself: the barrier of a pair of its own bodies may fall no faster than ``alpha h``.
+
+        grad h . u >= -alpha h      that is      -grad h . u <= alpha h,      h = d - margin
+
+    Nothing but the robot moves in it, so there is no time term, whatever the variant's rows for obstacles are.
+
+    Args:
+        query: pairs of the robot's own bodies, m.
+        alpha: class-K gain, 1/s.
+        margin: least distance asked for, m.
+    """
+    k = query.valid
+    return _soft_rows("self-collision", -query.dq[k], alpha * (query.d[k] - margin))
+
+
 def tvclf_row(now: float, ahead: FieldQuery, gamma: float, dt: float) -> Rows:
     """Time-varying control Lyapunov function: the distance to a moving target falls at the rate ``gamma``, or ``delta``
     pays for it.
@@ -124,6 +140,50 @@ def joint_limit_box(
     low = np.minimum(np.maximum(-alpha * (q - lower), slowest), fastest)
     high = np.maximum(np.minimum(alpha * (upper - q), fastest), slowest)
     return low, high
+
+
+def acceleration_box(
+    low: Array, high: Array, room_below: Array, room_above: Array, u_last: Array, limit: Array, dt: float
+) -> tuple[Array, Array]:
+    """The velocity bounds ``low``, ``high`` (n,) narrowed to what an acceleration limit allows.
+
+        u_last - a Dt <= u <= u_last + a Dt,      -v_stop(q - q_min) <= u <= v_stop(q_max - q)
+
+    with v_stop of :func:`stopping_speed`. A joint that was within the second bound can always keep both: its speed can
+    be taken back by a Dt a step until it stands, inside its limits. So the first is never given up, and where it
+    leaves less than ``low`` … ``high`` ask for (a joint-limit barrier of a steep ``limit_alpha``), the joint brakes as
+    hard as it may. The box is never empty. An infinite limit changes nothing.
+
+    Args:
+        low, high: bounds so far (n,), rad/s.
+        room_below, room_above: q - q_min and q_max - q (n,), rad, infinite where the joint has no limit.
+        u_last: the last command (n,), rad/s.
+        limit: a (n,), rad/s².
+        dt: Dt, the control period, s.
+    """
+    step = limit * dt
+    floor, ceiling = u_last - step, u_last + step
+    high = np.maximum(np.minimum(np.minimum(high, ceiling), stopping_speed(room_above, limit, dt)), floor)
+    low = np.minimum(np.maximum(np.maximum(low, floor), -stopping_speed(room_below, limit, dt)), ceiling)
+    return np.minimum(low, high), high
+
+
+def stopping_speed(room: Array, limit: Array, dt: float) -> Array:
+    """The greatest velocity v (n,) that still stops within ``room`` (n,), taken back by a Dt each step.
+
+    Held for Dt at a time, v = (m + f) a Dt with m whole and 0 <= f < 1 comes to rest after
+
+        s = v Dt + (v - a Dt) Dt + ... + f a Dt Dt = a Dt^2 ( m (m + 1) / 2 + (m + 1) f ),
+
+    which is piecewise linear in v and inverted here. No room, or a joint past its limit: 0. Infinite where ``limit``
+    is, whose joint stops at once.
+    """
+    finite = np.isfinite(limit) & np.isfinite(room)
+    unit = np.where(finite, limit, 1.0) * dt
+    s = np.where(finite, np.maximum(room, 0.0), 0.0) / (unit * dt)
+    m = np.floor(0.5 * (np.sqrt(1.0 + 8.0 * s) - 1.0))
+    speed: Array = np.where(finite, unit * (m + (s - 0.5 * m * (m + 1.0)) / (m + 1.0)), np.inf)
+    return speed
 
 
 def stack(parts: Sequence[Rows], n: int) -> Rows:

@@ -35,6 +35,8 @@ def _file_fields(data: Any) -> Iterator[tuple[Any, Any, Place]]:
             yield robot, "name", ("robot", "name")
         if "urdf" in robot:
             yield robot, "urdf", ("robot", "urdf")
+        if "srdf" in robot:
+            yield robot, "srdf", ("robot", "srdf")
         folders = robot.get("package_dirs")
         if isinstance(folders, list):
             for i in range(len(folders)):

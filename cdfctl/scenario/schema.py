@@ -94,6 +94,10 @@ class LimitsConfig(Strict):
         PositiveByName | None,
         about("greatest |u|: one number for all joints, or joint name: number; otherwise the URDF's", "rad/s"),
     ] = None
+    acceleration: Annotated[
+        PositiveByName | None,
+        about("greatest change of u: one number for all joints, or joint name: number; otherwise none", "rad/s^2"),
+    ] = None
 
 
 class RobotConfig(Strict):
@@ -106,6 +110,10 @@ class RobotConfig(Strict):
         BeforeValidator(ListOf(noun="folders")),
         about("where package:// of the URDF points, relative to the scenario file"),
     ] = ()
+    srdf: Annotated[
+        Label | None,
+        about("path of an SRDF, relative to the scenario file: which links may touch; otherwise the robot file's"),
+    ] = None
     lock: Annotated[dict[str, Plain], about("joint name: value it is locked at", "rad, m for a prismatic joint")] = (
         Field(default_factory=dict)
     )
@@ -207,6 +215,14 @@ class ControllerConfig(Strict):
     ] = None
     sheets: Annotated[
         int | None, BeforeValidator(Whole(1, 16)), about("CDF rows: how many distinct nearest contacts an obstacle")
+    ] = None
+    self_collision: Annotated[
+        int | None,
+        BeforeValidator(Whole(0, 64)),
+        about("rows for the nearest pairs of the robot's own links, this many; 0 for none"),
+    ] = None
+    self_collision_margin: Annotated[
+        PlainNonNegative | None, about("least distance of those pairs: h = d - margin", "m")
     ] = None
     on_infeasible: Annotated[
         Literal["fail", "least-violation", "brake"] | None,

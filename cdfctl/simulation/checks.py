@@ -39,17 +39,24 @@ def robot_of(config: RobotConfig) -> Robot:
         lock=config.lock,
         position_limits=config.limits.position,
         velocity_limits=config.limits.velocity,
+        acceleration_limits=config.limits.acceleration,
+        srdf=config.srdf,
         tip=config.tip,
     )
 
 
 def robot_complaints(config: RobotConfig, error: InputError) -> list[Complaint]:
     """Why :func:`robot_of` failed, placed at the joint names at fault where it is they."""
-    velocity = config.limits.velocity
+    limits = config.limits
     named: list[Place] = [("robot", "lock", name) for name in config.lock]
-    named += [("robot", "limits", "position", name) for name in config.limits.position]
-    named += [("robot", "limits", "velocity", name) for name in (velocity if isinstance(velocity, dict) else ())]
-    at = "tip" if config.tip is not None and f"'{config.tip}'" in error.message else "name" if config.name else "urdf"
+    named += [("robot", "limits", "position", name) for name in limits.position]
+    for key, given in (("velocity", limits.velocity), ("acceleration", limits.acceleration)):
+        named += [("robot", "limits", key, name) for name in (given if isinstance(given, dict) else ())]
+    at = "name" if config.name else "urdf"
+    if config.tip is not None and f"'{config.tip}'" in error.message:
+        at = "tip"
+    elif config.srdf is not None and error.message.startswith(f"{config.srdf}:"):
+        at = "srdf"
     fallback: list[Complaint] = [(error.message, error.hint, ("robot", at))]
     if not named:
         return fallback
