@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from cdfctl.scenario.feed import measured_only
 from cdfctl.scenario.placing import MOST_COPIES, MOST_OBSTACLES
 from cdfctl.scenario.plant import MujocoConfig, expanded
 from cdfctl.scenario.values import Complaint, Place
@@ -20,7 +21,7 @@ MAX_STEPS = 1_000_000
 
 def inconsistencies(data: dict[str, Any]) -> list[Complaint]:
     """Message, hint and place of everything that disagrees in the scenario ``data``."""
-    return [*_joint_counts(data), *_names(data), *_steps(data), *_physics_steps(data), *_rules(data)]
+    return [*_joint_counts(data), *_names(data), *_steps(data), *_physics_steps(data), *_rules(data), *measured_only(data)]
 
 
 def _joint_counts(data: dict[str, Any]) -> Iterator[Complaint]:

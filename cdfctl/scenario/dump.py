@@ -7,6 +7,7 @@ from typing import Any
 
 import yaml
 
+from cdfctl.scenario.feed import collapse
 from cdfctl.scenario.schema import Scenario
 from cdfctl.scenario.yaml_loader import scalar
 
@@ -58,5 +59,5 @@ _Dumper.add_representer(dict, _mapping)
 
 def dump(scenario: Scenario) -> str:
     """YAML text of ``scenario``: every field that has a value, in the order of the schema."""
-    data = scenario.model_dump(mode="json", exclude_none=True)
+    data = collapse(scenario.model_dump(mode="json", exclude_none=True))
     return yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=110)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from cdfctl.errors import InputError, name_hint
 from cdfctl.scenario import problems as told
+from cdfctl.scenario.feed import expand, in_file
 from cdfctl.scenario.files import SUFFIXES, absolute
 from cdfctl.scenario.overrides import Override, apply, blame, parse_override
 from cdfctl.scenario.problems import Problem, ScenarioErrors, parse_path, path_text
@@ -47,6 +48,7 @@ class ScenarioFile:
     def located(self, field_path: str | told.Path, message: str, hint: str | None = None) -> Problem:
         """A problem found later (by a check that needs the robot, say), at its place in the file."""
         place = parse_path(field_path) if isinstance(field_path, str) else field_path
+        place = in_file(place, self.scenario.feed is not None)
         return _locate(self.shown, self._document, self._overrides, message, hint, place)
 
     def errors(self, found: Sequence[Problem]) -> ScenarioErrors:
@@ -95,9 +97,11 @@ def load_scenario(source: str | Path, overrides: Sequence[str | Override] = ()) 
     data, found = apply(document.data, changes)
     suspect = [problem.path for problem in document.problems if problem.path is not None]
     found += [_yaml_problem(shown, document, problem) for problem in document.problems]
+    data, measured, wrong = expand(data)
     data, missing = absolute(data, path.resolve().parent)
     scenario, complaints = validate(data)
-    for message, hint, place in [*complaints, *missing]:
+    complaints = [*wrong, *((m, h, in_file(p, measured)) for m, h, p in [*complaints, *missing])]
+    for message, hint, place in complaints:
         if not any(place[: len(p)] == p for p in suspect):
             found.append(_locate(shown, document, changes, message, hint, place))
     if found or scenario is None:

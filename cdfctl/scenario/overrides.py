@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cdfctl.errors import InputError
+from cdfctl.scenario.feed import collapse, expand, in_file
 from cdfctl.scenario.plant import expanded
 from cdfctl.scenario.problems import Path, Problem, ScenarioErrors, parse_path, path_text
 from cdfctl.scenario.schema import Scenario
@@ -108,11 +109,12 @@ def set_fields(scenario: Scenario, values: Mapping[str, Any], origin: str = "set
     Raises:
         ScenarioErrors: the result does not validate; each problem names ``origin`` and the field.
     """
-    data = scenario.model_dump(mode="json", exclude_none=True)
+    data = collapse(scenario.model_dump(mode="json", exclude_none=True))
     overrides = [Override(parse_path(path), value, f"{origin} {path}={value}") for path, value in values.items()]
     data, problems = apply(data, overrides)
+    data, measured, wrong = expand(data)
     changed, complaints = validate(data)
-    for message, hint, place in complaints:
+    for message, hint, place in [*wrong, *((m, h, in_file(p, measured)) for m, h, p in complaints)]:
         problems.append(Problem(scenario.name, message, path_text(place), hint, origin=blame(overrides, place)))
     if changed is None or problems:
         raise ScenarioErrors(problems, scenario.name)

@@ -35,7 +35,20 @@ def json_schema() -> dict[str, Any]:
     for name, default in DEFAULTS.items():
         info = schema["$defs"]["ControllerConfig"]["properties"][name]
         info.update({"default": default.value, "x-source": default.source})
+    _one_place_for_obstacles(schema)
     return schema
+
+
+def _one_place_for_obstacles(schema: dict[str, Any]) -> None:
+    """The file has ``obstacles: {source, items, …}`` where the model has ``feed`` beside ``obstacles``."""
+    properties, feed = schema["properties"], schema["$defs"]["FeedConfig"]
+    del properties["feed"]
+    declared = properties["obstacles"]
+    items = {key: declared[key] for key in ("type", "items")}
+    feed["properties"]["items"] = {**items, "description": "the measured obstacles", "x-unit": "", "x-source": ""}
+    feed["required"] = [*feed["required"], "items"]
+    outer = {key: value for key, value in declared.items() if key not in items}
+    properties["obstacles"] = {"anyOf": [items, {"$ref": "#/$defs/FeedConfig"}], **outer}
 
 
 def reference() -> tuple[FieldRow, ...]:
@@ -66,11 +79,20 @@ def _rows(schema: dict[str, Any], model: dict[str, Any], prefix: str) -> Iterato
             source=info.get("x-source", "") if "default" in info and "$ref" not in info else "",
             description=info.get("description", ""),
         )
+        if path == "obstacles":
+            listed, measured = info["anyOf"]
+            info = listed
+            yield from _rows(schema, _without_items(schema["$defs"][measured["$ref"].rsplit("/", 1)[-1]]), path)
         items = info.get("items")
         inner, suffix = (items, "[]") if isinstance(items, dict) else (info, "")
         for tag, reference_ in _models(inner):
             below = f"{path}{suffix}({tag})" if tag else f"{path}{suffix}"
             yield from _rows(schema, schema["$defs"][reference_.rsplit("/", 1)[-1]], below)
+
+
+def _without_items(model: dict[str, Any]) -> dict[str, Any]:
+    """A feed's own fields: its items are the obstacles, told of once."""
+    return {**model, "properties": {key: value for key, value in model["properties"].items() if key != "items"}}
 
 
 def _models(info: dict[str, Any]) -> list[tuple[str, str]]:

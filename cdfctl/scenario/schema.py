@@ -17,6 +17,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from cdfctl.errors import name_hint
 from cdfctl.scenario.consistency import inconsistencies
 from cdfctl.scenario.placing import RedrawConfig
+from cdfctl.scenario.feed import FeedConfig
 from cdfctl.scenario.plant import KinematicConfig, PlantField
 from cdfctl.scenario.shapes import Body, ObstacleConfig
 from cdfctl.scenario.values import (
@@ -280,6 +281,7 @@ class Scenario(Strict):
     redraw_within: Annotated[
         RedrawConfig | None, about("when the whole set-up is drawn again: any obstacle breaks one of these")
     ] = None
+    feed: Annotated[FeedConfig | None, about("where measurements of the obstacles come from")] = None
     controller: Annotated[ControllerConfig, about("by which controller")] = ControllerConfig()
     plant: PlantField = KinematicConfig()
     simulation: Annotated[SimulationConfig, about("the rollout")] = SimulationConfig()
