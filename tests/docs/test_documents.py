@@ -38,8 +38,14 @@ def commands(page: Path) -> list[str]:
 
 def files(page: Path) -> dict[str, str]:
     """The files a page shows: code blocks with a caption."""
-    found = (CAPTION.match(body) for body in blocks(page, "{code-block} yaml"))
+    shown = [body for kind in ("yaml", "xml") for body in blocks(page, f"{{code-block}} {kind}")]
+    found = (CAPTION.match(body) for body in shown)
     return {match["name"]: match["text"] for match in found if match}
+
+
+def write_files(folder: Path, page: Path) -> None:
+    for name, text in files(page).items():
+        (folder / name).write_text(text)
 
 
 @pytest.fixture
@@ -51,8 +57,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize("page", [page for page in PAGES if commands(page)], ids=lambda page: page.name)
 def test_every_command_of_a_page_ends_as_it_says(folder: Path, page: Path, capfd):
-    for name, text in files(page).items():
-        (folder / name).write_text(text)
+    write_files(folder, page)
     for command in commands(page):
         words = shlex.split(command, comments=True)
         said = re.search(r"# exit status (\d+)$", command)
@@ -63,6 +68,7 @@ def test_every_command_of_a_page_ends_as_it_says(folder: Path, page: Path, capfd
 
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "python")], ids=lambda page: page.name)
 def test_the_python_of_a_page_runs(folder: Path, page: Path):
+    write_files(folder, page)
     names: dict[str, object] = {}
     for body in blocks(page, "python"):
         exec(compile(body, page.name, "exec"), names)
