@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from cdfctl import __version__
-from cdfctl.cli import bench, build_cdf, check, doctor, options, plot, robots, run, scenarios, schema
+from cdfctl.cli import bench, build_cdf, check, doctor, options, plot, robots, run, scenarios, schema, view
 from cdfctl.cli.console import abandon_stdout
 from cdfctl.cli.failures import report_bug, report_failure, report_usage
 from cdfctl.errors import CdfctlError
@@ -36,6 +36,7 @@ app.command("bench")(bench.bench)
 app.command("check")(check.check)
 app.command("build-cdf")(build_cdf.build_cdf)
 app.command("plot")(plot.plot)
+app.command("view")(view.view)
 app.command("robots")(robots.robots)
 app.command("scenarios")(scenarios.scenarios)
 app.command("schema")(schema.schema)

@@ -25,6 +25,20 @@ class Nearest(NamedTuple):
     obstacle: str
 
 
+class Closest(NamedTuple):
+    """The pair of least signed distance (m): the robot's object, the obstacle's index, and their nearest points (3,).
+
+    In penetration the points are those of deepest penetration; of a cloud in penetration, those of its first point found
+    inside.
+    """
+
+    distance: float
+    object: int
+    obstacle: int
+    on_robot: Array
+    on_obstacle: Array
+
+
 class Clearance:
     """Distances of all pairs (object of the robot's geometry, obstacle); pair p is (p // m, p % m).
 
@@ -70,6 +84,19 @@ class Clearance:
         """Signed distances (objects * m,) of all pairs as placed, m."""
         pin.computeDistances(self._geometry, self._placed)
         return np.array([self._value(pair, result) for pair, result in enumerate(self._placed.distanceResults)])
+
+    def closest(self) -> Closest | None:
+        """The least distance as placed, and where; None where there is no obstacle, or no geometry."""
+        distances = self.distances()
+        if not distances.size:
+            return None
+        pair = int(distances.argmin())
+        result = self._placed.distanceResults[pair]
+        a, b = np.array(result.getNearestPoint1()), np.array(result.getNearestPoint2())
+        cloud = self._clouds.get(pair % self.obstacles)
+        if cloud is not None and result.min_distance > 0.0:
+            b = b + (a - b) * (cloud.radius / result.min_distance)
+        return Closest(float(distances[pair]), pair // self.obstacles, pair % self.obstacles, a, b)
 
     def joint_frames(self) -> tuple[Array, Array]:
         """Rotations (n, 3, 3) and origins (n, 3) of the joints as placed, world frame."""
