@@ -19,7 +19,7 @@ from cdfctl.benchmark.sweep import Setting, label
 from cdfctl.benchmark.tables import table_mark
 from cdfctl.errors import InputError
 from cdfctl.robots.robot import Robot
-from cdfctl.scenario.library import load_scenario
+from cdfctl.scenario.library import ScenarioFile, load_scenario
 from cdfctl.scenario.overrides import Override
 from cdfctl.scenario.resolve import resolve
 from cdfctl.scenario.schema import Scenario
@@ -154,6 +154,7 @@ def make_plan(
                 changes = [*overrides, *(setting.override for setting in settings), *_chosen(controller, rule)]
                 changes.append(Override(("seed",), seed, f"--seed {seed}"))
                 file = load_scenario(source, changes)
+                _check_repeatable(file)
                 place = robot_key(file.scenario)
                 wired = assemble(file, robot=robots.get(place))
                 robots[place] = wired.robot
@@ -170,6 +171,17 @@ def make_plan(
         seed=seed,
         robots={place: robot.hash for place, robot in robots.items()},
     )
+
+
+def _check_repeatable(file: ScenarioFile) -> None:
+    """A benchmark's trial is the same for every controller: nothing in it may come from outside."""
+    found = []
+    if file.scenario.feed is not None:
+        found.append(file.located("obstacles", "a benchmark cannot repeat what is measured", "declare the obstacles"))
+    if file.scenario.plant.type == "franka":
+        found.append(file.located("plant", "a benchmark does not drive an arm", "plant: kinematic or mujoco"))
+    if found:
+        raise file.errors(found)
 
 
 def robot_key(scenario: Scenario) -> str:

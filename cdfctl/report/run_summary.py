@@ -94,6 +94,7 @@ def figures(result: RunResult, run_dir: str, tip: str) -> list[tuple[str, str]]:
         ("least clearance", clearance(verdict)),
         ("infeasible steps", infeasible),
         *plant_figures(result.plant),
+        *measured_figures(result.measured),
         ("step time", f"{milliseconds(times['p50'])} median, {milliseconds(times['p99'])} p99"),
         ("draw", f"seed {scenario.seed}, trial {result.trial}"),
         ("run folder", run_dir),
@@ -113,6 +114,15 @@ def plant_figures(report: Report) -> list[tuple[str, str]]:
         label = name.removesuffix(suffix).replace("_", " ")
         lines.append((label, f"{shown} {UNITS[suffix]}" if suffix else shown))
     return lines
+
+
+def measured_figures(report: Report | None) -> list[tuple[str, str]]:
+    """What became of the messages about measured obstacles, in a line."""
+    if report is None:
+        return []
+    counts = {name: count for name, count in report.items() if name != "braked_steps"}
+    told = ", ".join(f"{count} {name}" for name, count in counts.items() if count or name == "accepted")
+    return [("measurements", told), ("braked for want of", f"{report['braked_steps']} steps")]
 
 
 def clearance(verdict: Verdict) -> str:

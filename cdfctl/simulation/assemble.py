@@ -22,9 +22,12 @@ from cdfctl.simulation.judge import judge
 from cdfctl.simulation.motion import SceneMotion
 from cdfctl.simulation.plants import Plant
 from cdfctl.simulation.plants.kinematic import KinematicPlant
+from cdfctl.simulation.plants.paced import PacedPlant
 from cdfctl.simulation.result import RunResult
 from cdfctl.simulation.rollout import Rollout, Step
 from cdfctl.simulation.shapes import vector_of
+from cdfctl.simulation.stream.guard import Guard
+from cdfctl.simulation.stream.motion import MeasuredMotion
 
 
 @dataclass
@@ -37,6 +40,7 @@ class Trial:
         robot: the robot.
         motion: the obstacles over time.
         rollout: the closed loop.
+        guard: what watches over measured obstacles; None where they are not measured.
     """
 
     scenario: Scenario
@@ -44,10 +48,14 @@ class Trial:
     robot: Robot
     motion: SceneMotion
     rollout: Rollout
+    guard: Guard | None = None
 
     def run(self) -> Generator[Step]:
         """Run the closed loop, yielding after every control step; it may be left early."""
-        return self.rollout.steps()
+        try:
+            yield from self.rollout.steps()
+        finally:
+            self.motion.close()
 
     def result(self) -> RunResult:
         """What the steps so far come to, judged: all of them after :meth:`run`, or those before an interrupt."""
@@ -57,10 +65,11 @@ class Trial:
             robot=self.robot.name,
             trial=self.trial,
             trajectory=trajectory,
-            verdict=judge(self.robot, self.motion, trajectory, self.rollout.stop),
+            verdict=judge(self.robot, self.motion.settled(), trajectory, self.rollout.stop),
             stop=self.rollout.stop,
             reason=self.rollout.reason,
             plant=self.rollout.plant.report(),
+            measured=self.guard.report() if self.guard is not None else None,
         )
 
 
@@ -131,7 +140,9 @@ def _assemble(scenario: Scenario, trial: int, robot: Robot) -> Trial:
     if complaints:
         raise _MisfitError(complaints)
     simulation = scenario.simulation
-    motion = SceneMotion(scenario.obstacles)
+    motion, guard = SceneMotion(scenario.obstacles), None
+    if scenario.feed is not None:
+        motion = MeasuredMotion(scenario.obstacles, scenario.feed)
     controller = build(robot, scenario.controller, scenario.task, simulation.dt)
     target: SceneMotion | None = None
     goal: Goal
@@ -142,9 +153,13 @@ def _assemble(scenario: Scenario, trial: int, robot: Robot) -> Trial:
         goal = Touch(controller.reaching, target, scenario.controller.reach_tolerance)
     else:
         goal = goal_of(scenario.task, robot, simulation.tolerance)
+    plant = plant_of(scenario, robot, motion)
+    if isinstance(motion, MeasuredMotion):
+        guard = Guard(controller, motion)
+        plant = plant if isinstance(scenario.plant, FrankaConfig) else PacedPlant(plant)
     rollout = Rollout(
-        controller,
-        plant_of(scenario, robot, motion),
+        guard if guard is not None else controller,
+        plant,
         motion,
         goal,
         vector_of(scenario.robot.q0),
@@ -152,7 +167,7 @@ def _assemble(scenario: Scenario, trial: int, robot: Robot) -> Trial:
         time_limit=simulation.time_limit,
         target=target,
     )
-    return Trial(scenario, trial, robot, motion, rollout)
+    return Trial(scenario, trial, robot, motion, rollout, guard)
 
 
 def plant_of(scenario: Scenario, robot: Robot, motion: SceneMotion) -> Plant:

@@ -72,7 +72,7 @@ class SceneMotion:
         poses = self._pose0.copy()
         poses[:, :3] += t * self._twist0[:, :3]
         for i in self._turning:
-            poses[i, 3:] = _turn(self._twist0[i, 3:] * t, self._pose0[i, 3:])
+            poses[i, 3:] = turn(self._twist0[i, 3:] * t, self._pose0[i, 3:])
         for i, path in self._paths.items():
             poses[i] = path.pose(t)
         return poses
@@ -87,6 +87,13 @@ class SceneMotion:
     def at(self, t: float) -> Scene:
         """The scene at time ``t`` (s)."""
         return Scene.from_arrays(self.shapes, self.names, self.poses(t), self.twists(t))
+
+    def settled(self) -> SceneMotion:
+        """The motion as it is known once a run is over."""
+        return self
+
+    def close(self) -> None:
+        """Nothing more will be asked of it but what is settled."""
 
     def max_speed(self, i: int, t0: float, t1: float) -> float:
         """Bound on the speed (m/s) of obstacle ``i``'s origin within [t0, t1]."""
@@ -112,7 +119,7 @@ class _Waypoints:
         self._spans = np.zeros((k + 1, 6))
         self._spans[1:k, :3] = np.diff(self._positions, axis=0) / dt[:, None]
         for s in range(k - 1):
-            self._spans[s + 1, 3:] = _rotation_between(self._quaternions[s], self._quaternions[s + 1]) / dt[s]
+            self._spans[s + 1, 3:] = rotation_between(self._quaternions[s], self._quaternions[s + 1]) / dt[s]
 
     def _span(self, t: float) -> int:
         return int(np.searchsorted(self._times, t, side="right"))
@@ -122,7 +129,7 @@ class _Waypoints:
         k = max(span - 1, 0)
         since = t - self._times[k]
         twist = self._spans[span]
-        return np.concatenate([self._positions[k] + since * twist[:3], _turn(twist[3:] * since, self._quaternions[k])])
+        return np.concatenate([self._positions[k] + since * twist[:3], turn(twist[3:] * since, self._quaternions[k])])
 
     def twist(self, t: float) -> Array:
         twist: Array = self._spans[self._span(t)].copy()
@@ -176,14 +183,14 @@ def _unit(quaternion: Array) -> Array:
     return unit
 
 
-def _turn(w: Array, quaternion: Array) -> Array:
+def turn(w: Array, quaternion: Array) -> Array:
     """exp(w) applied, in world axes, to a unit quaternion x y z w."""
     half = 0.5 * math.sqrt(float(w @ w))
     vector = 0.5 * float(np.sinc(half / math.pi)) * w  # sin(half)/half, 1 at 0
     return _unit(_product(np.array([*vector, math.cos(half)]), quaternion))
 
 
-def _rotation_between(first: Array, second: Array) -> Array:
+def rotation_between(first: Array, second: Array) -> Array:
     """The shortest w with exp(w) first = second, as rotations; |w| <= pi."""
     step = _product(second, first * np.array([-1.0, -1.0, -1.0, 1.0]))
     if step[3] < 0.0:

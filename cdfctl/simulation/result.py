@@ -28,6 +28,7 @@ class RunResult:
         stop: why the rollout ended.
         reason: what went wrong where ``stop`` is ``error``, what the plant said where it is ``contact``, else None.
         plant: what the plant has to say of the run.
+        measured: what became of the measurements of obstacles; None where they are not measured.
     """
 
     scenario: Scenario
@@ -38,6 +39,7 @@ class RunResult:
     stop: Stop
     reason: str | None = None
     plant: Report = field(default_factory=lambda: {"type": "kinematic"})
+    measured: Report | None = None
 
     @property
     def infeasible_steps(self) -> int:
@@ -47,7 +49,7 @@ class RunResult:
     def document(self, run_dir: str) -> dict[str, Any]:
         """The keys of ``cdfctl run --json``; a number that is not finite is None."""
         verdict, trajectory = self.verdict, self.trajectory
-        return {
+        document = {
             "scenario": self.scenario.name,
             "controller": self.scenario.controller.variant,
             "robot": self.robot,
@@ -65,6 +67,7 @@ class RunResult:
             "run_dir": run_dir,
             "plant": {name: _number(x) if isinstance(x, float) else x for name, x in self.plant.items()},
         }
+        return document if self.measured is None else {**document, "measured": dict(self.measured)}
 
 
 def step_milliseconds(trajectory: Trajectory) -> Mapping[str, float | None]:

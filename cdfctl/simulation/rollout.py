@@ -11,8 +11,8 @@ import math
 import time
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
+from typing import Protocol
 
-from cdfctl.control.controller import Controller
 from cdfctl.errors import PlantError
 from cdfctl.simulation.goals import Goal
 from cdfctl.simulation.judge import Stop
@@ -20,6 +20,18 @@ from cdfctl.simulation.motion import SceneMotion
 from cdfctl.simulation.plants import Plant
 from cdfctl.simulation.recorder import Recorder
 from cdfctl.types import Array, Decision, Scene, State, Trajectory
+
+
+class Deciding(Protocol):
+    """What a rollout asks for a command: a :class:`cdfctl.control.controller.Controller`, or one with a guard."""
+
+    def step(self, state: State, scene: Scene, target: Scene | None = None) -> Decision:
+        """What to command now."""
+        ...
+
+    def reset(self) -> None:
+        """Forget the steps so far."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -45,7 +57,7 @@ class Rollout:
 
     def __init__(
         self,
-        controller: Controller,
+        controller: Deciding,
         plant: Plant,
         motion: SceneMotion,
         goal: Goal,
