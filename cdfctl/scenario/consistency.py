@@ -21,7 +21,8 @@ MAX_STEPS = 1_000_000
 
 def inconsistencies(data: dict[str, Any]) -> list[Complaint]:
     """Message, hint and place of everything that disagrees in the scenario ``data``."""
-    return [*_joint_counts(data), *_names(data), *_steps(data), *_physics_steps(data), *_rules(data), *measured_only(data)]
+    checks = (_joint_counts, _names, _steps, _physics_steps, _rules, measured_only, _measured_twice)
+    return [complaint for check in checks for complaint in check(data)]
 
 
 def _joint_counts(data: dict[str, Any]) -> Iterator[Complaint]:
@@ -109,6 +110,19 @@ def _physics_steps(data: dict[str, Any]) -> Iterator[Complaint]:
         parts = next((k for k in (1, 2, 4, 5, 8, 10, 16, 20, 25, 40, 50) if k >= dt / step), 100)
         hint = f"for example plant.timestep={dt / parts:g}"
         yield f"the step of the physics, {step:g} s, {what} the control step, {dt:g} s", hint, ("plant", "timestep")
+
+
+def _measured_twice(data: dict[str, Any]) -> Iterator[Complaint]:
+    """Errors are of a picture we make ourselves, and a delay is made up for once."""
+    measurement = data.get("measurement")
+    if not isinstance(measurement, dict):
+        return
+    sizes = ("delay", "position_noise", "speed_error", "heading_error_deg", "elevation_error_deg", "dropout")
+    if data.get("feed") is not None and any(measurement.get(name) for name in sizes):
+        yield "measured obstacles have errors of their own", "leave measurement out", ("measurement",)
+    if measurement.get("delay") and measurement.get("compensate_delay", True) and _get(data, "controller", "delay"):
+        hint = "measurement.compensate_delay: false, or leave controller.delay out"
+        yield "the delay is made up for already, by measurement.compensate_delay", hint, ("controller", "delay")
 
 
 def _get(data: Any, *keys: str) -> Any:
