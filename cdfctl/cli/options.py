@@ -58,6 +58,9 @@ MoveToStart: TypeAlias = Annotated[
 DryRun: TypeAlias = Annotated[
     bool, typer.Option("--dry-run", help="Plant franka: print what would be sent; needs no arm and writes no folder.")
 ]
+Live: TypeAlias = Annotated[
+    bool, typer.Option("--live", help="Let cdfctl view RUN --live follow the run while it goes on.")
+]
 Settings: TypeAlias = Annotated[
     list[str] | None,
     typer.Option(

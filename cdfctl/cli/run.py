@@ -16,6 +16,7 @@ from cdfctl.errors import PlantError
 
 if TYPE_CHECKING:
     from cdfctl.simulation.assemble import Trial
+    from cdfctl.simulation.journal import Journal
     from cdfctl.simulation.result import RunResult
 
 INTERRUPTED = 130
@@ -33,6 +34,7 @@ def run(
     host: options.Host = None,
     move_to_start: options.MoveToStart = False,
     dry_run: options.DryRun = False,
+    live: options.Live = False,
     settings: options.Settings = None,
     out: options.RunFolder = None,
     json: options.Json = False,
@@ -48,6 +50,7 @@ def run(
     from cdfctl.fields.table.store import run_hint
     from cdfctl.scenario.variants import VARIANTS
     from cdfctl.simulation.assemble import assemble
+    from cdfctl.simulation.journal import journal
     from cdfctl.simulation.run_folder import check_target, default_folder, write_run
 
     wired = assemble(file, trial=trial)
@@ -57,12 +60,15 @@ def run(
         return rehearse(wired, json=json, quiet=quiet)
     folder = out if out is not None else default_folder(wired.scenario, trial)
     check_target(folder)
-    finished = follow(wired, quiet=quiet)
-    result = wired.result()
-    if not finished and not len(result.trajectory.u):
-        note("cdfctl: interrupted before the first step; nothing was written")
-        return INTERRUPTED
-    document = write_run(folder, result)
+    with journal(folder, wired.scenario, on=live) as kept:
+        finished = follow(wired, quiet=quiet, kept=kept)
+        result = wired.result()
+        if not finished and not len(result.trajectory.u):
+            note("cdfctl: interrupted before the first step; nothing was written")
+            return INTERRUPTED
+        document = write_run(folder, result)
+    if kept.problem is not None:
+        note(f"cdfctl: warning: could not be followed to the end: {kept.problem}", quiet=quiet)
     if json:
         write_json(document)
     elif not quiet:
@@ -75,19 +81,19 @@ def run(
     return status_of(result)
 
 
-def follow(wired: Trial, *, quiet: bool) -> bool:
+def follow(wired: Trial, *, quiet: bool, kept: Journal) -> bool:
     """Run to the end, with a progress bar where standard error is a terminal; False if interrupted on the way."""
     steps = wired.run()
     with suppress(KeyboardInterrupt), interrupts() as interrupted, closing(steps):
         if quiet or not sys.stderr.isatty():
-            return all(not interrupted() for _ in steps)
+            return all(not interrupted() for _ in kept.through(steps))
         from rich.progress import BarColumn, Progress, TextColumn
 
         columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[clock]}"))
         with Progress(*columns, console=stderr(), transient=True) as progress:
             # The first step of a first run waits for the compiler.
             bar = progress.add_task("preparing (a first run compiles)", total=wired.rollout.max_steps, clock="")
-            for step in steps:
+            for step in kept.through(steps):
                 if interrupted():
                     return False
                 clock = f"{step.state.t:.1f} of at most {wired.scenario.simulation.time_limit:g} s"

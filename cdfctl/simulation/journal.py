@@ -14,6 +14,7 @@ import math
 import shutil
 import tempfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
@@ -47,8 +48,8 @@ class Journal:
     A disk that fails must not end a run: then the journal stops, and ``problem`` says why.
     """
 
-    def __init__(self, folder: Path, scenario: Scenario) -> None:
-        """For a run into ``folder``. Nothing is written before the first step.
+    def __init__(self, folder: Path, scenario: Scenario, *, on: bool) -> None:
+        """For a run into ``folder``. Nothing is written before the first step, nor ever unless ``on``.
 
         Raises:
             InputError: another run into the same folder is going on.
@@ -56,14 +57,15 @@ class Journal:
         self._live, self._scenario = live_folder(folder), scenario
         self._file: IO[bytes] | None = None
         self._shapes: dict[str, tuple[int, ...]] = {}
+        self._on = on
         self.problem: str | None = None
-        if is_going_on(self._live):
+        if on and is_going_on(self._live):
             raise InputError(f"{folder}: another run into it is going on", hint="give another --out")
 
     def through(self, steps: Iterator[Step]) -> Iterator[Step]:
         """The same steps, each written down on its way."""
         for step in steps:
-            if self.problem is None:
+            if self._on and self.problem is None:
                 try:
                     self._write(step)
                 except OSError as error:
@@ -102,6 +104,16 @@ class Journal:
             shutil.rmtree(draft, ignore_errors=True)
             raise
         return file
+
+
+@contextmanager
+def journal(folder: Path, scenario: Scenario, *, on: bool) -> Iterator[Journal]:
+    """A journal, removed at the end; arguments and errors as of :class:`Journal`."""
+    kept = Journal(folder, scenario, on=on)
+    try:
+        yield kept
+    finally:
+        kept.close()
 
 
 def _record(step: Step) -> dict[str, Array]:

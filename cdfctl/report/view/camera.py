@@ -51,7 +51,7 @@ class Camera:
             centre,
             up,
             FIELD_OF_VIEW,
-            float(low[2]) - (0.15 * size if flat else 0.0),
+            float(low[2]) - (0.02 * size if flat else 0.0),
             grid,
         )
 

@@ -25,7 +25,9 @@ DISTANCE = "#000000"
 PLAN = "#009E73"
 COLLISION = "#8FA8BF"
 PLAIN = "#E8EAED"
-"""A robot whose files give it no colour."""
+"""A visual whose files give it no colour."""
+BODY = "#5B6B7C"
+"""A robot, or a link, that has no visuals."""
 
 
 def obstacle_colour(index: int) -> str:

@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 
 from cdfctl.errors import CdfctlError, MissingError
-from cdfctl.report.view.colours import COLLISION, PLAIN, Rgb, rgb
+from cdfctl.report.view.colours import BODY, COLLISION, PLAIN, Rgb, rgb
 from cdfctl.robots.convex import convex_hull
 from cdfctl.robots.robot import Robot
 from cdfctl.robots.visuals import MeshFile, Visual, read_visuals
 from cdfctl.types import Array, Box, Capsule, ConvexMesh, Cylinder, IntArray, Shape, Sphere
 
 INSTALL = "python -m pip install 'cdfctl[view]'"
-THIN = 0.006
+THIN = 0.011
 """Least radius drawn, as a share of the robot's size."""
 
 
@@ -112,7 +112,7 @@ def visual_parts(robot: Robot, size: float) -> tuple[list[Part], list[str]]:
             except CdfctlError as error:
                 problems[visual.link] = error.message
     parts = [part for link, items in by_link.items() if link not in problems for part in items]
-    collision = collision_parts(robot, size, PLAIN)
+    collision = collision_parts(robot, size, BODY)
     if not parts and not problems:
         return collision, []
     warnings = [f"{reason}; drawing the collision geometry of '{link}'" for link, reason in problems.items()]

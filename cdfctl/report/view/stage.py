@@ -208,8 +208,8 @@ class Stage:
         low = self.camera.floor
         self._scene.add_grid(
             "/ground",
-            width=3.0 * self.size,
-            height=3.0 * self.size,
+            width=4.0 * self.size,
+            height=4.0 * self.size,
             cell_size=0.25 * self.camera.grid,
             section_size=self.camera.grid,
             cell_color=(232, 235, 239),
