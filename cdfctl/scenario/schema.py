@@ -16,8 +16,9 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from cdfctl.errors import name_hint
 from cdfctl.scenario.consistency import inconsistencies
-from cdfctl.scenario.placing import RedrawConfig
 from cdfctl.scenario.feed import FeedConfig
+from cdfctl.scenario.measurement import MeasurementConfig
+from cdfctl.scenario.placing import RedrawConfig
 from cdfctl.scenario.plant import KinematicConfig, PlantField
 from cdfctl.scenario.shapes import Body, ObstacleConfig
 from cdfctl.scenario.values import (
@@ -282,6 +283,9 @@ class Scenario(Strict):
         RedrawConfig | None, about("when the whole set-up is drawn again: any obstacle breaks one of these")
     ] = None
     feed: Annotated[FeedConfig | None, about("where measurements of the obstacles come from")] = None
+    measurement: Annotated[MeasurementConfig, about("how wrong the controller's picture of the obstacles is")] = (
+        MeasurementConfig()
+    )
     controller: Annotated[ControllerConfig, about("by which controller")] = ControllerConfig()
     plant: PlantField = KinematicConfig()
     simulation: Annotated[SimulationConfig, about("the rollout")] = SimulationConfig()

@@ -77,11 +77,13 @@ class Real:
     Attributes:
         above: the number must be greater than this.
         least: the number must be at least this.
+        most: the number must be at most this.
         drawable: ``{uniform: [a, b]}`` may stand in its place.
     """
 
     above: float | None = None
     least: float | None = None
+    most: float | None = None
     drawable: bool = False
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
@@ -95,6 +97,8 @@ class Real:
             number["exclusiveMinimum"] = self.above
         if self.least is not None:
             number["minimum"] = self.least
+        if self.most is not None:
+            number["maximum"] = self.most
         if not self.drawable:
             return number
         pair = {"type": "array", "items": number, "minItems": 2, "maxItems": 2}
@@ -127,6 +131,8 @@ class Real:
             raise refuse(f"must be greater than {self.above:g}, found {found(value)}")
         if self.least is not None and not number >= self.least:
             raise refuse(f"must be at least {self.least:g}, found {found(value)}")
+        if self.most is not None and not number <= self.most:
+            raise refuse(f"must be at most {self.most:g}, found {found(value)}")
         return number
 
     def _draw(self, value: dict[Any, Any]) -> Uniform:
@@ -274,6 +280,7 @@ Flag = Annotated[bool, BeforeValidator(_flag)]
 Plain = Annotated[float, Real()]
 PlainPositive = Annotated[float, Real(above=0.0)]
 PlainNonNegative = Annotated[float, Real(least=0.0)]
+Share = Annotated[float, Real(least=0.0, most=1.0)]
 PerJoint = Annotated[float | tuple[float, ...], RealOr(Real(least=0.0), "list")]
 PositivePerJoint = Annotated[float | tuple[float, ...], RealOr(Real(above=0.0), "list")]
 PositiveByName = Annotated[float | dict[str, float], RealOr(Real(above=0.0), "mapping")]

@@ -19,6 +19,7 @@ from cdfctl.simulation.checks import robot_complaints, robot_of, scenario_compla
 from cdfctl.simulation.drawing import draw_trial
 from cdfctl.simulation.goals import Goal, Touch, goal_of
 from cdfctl.simulation.judge import judge
+from cdfctl.simulation.measurement import OBSTACLES, TARGET, Sensor
 from cdfctl.simulation.motion import SceneMotion
 from cdfctl.simulation.plants import Plant
 from cdfctl.simulation.plants.kinematic import KinematicPlant
@@ -157,6 +158,7 @@ def _assemble(scenario: Scenario, trial: int, robot: Robot) -> Trial:
     if isinstance(motion, MeasuredMotion):
         guard = Guard(controller, motion)
         plant = plant if isinstance(scenario.plant, FrankaConfig) else PacedPlant(plant)
+    errors = scenario.measurement, scenario.seed, trial
     rollout = Rollout(
         guard if guard is not None else controller,
         plant,
@@ -165,7 +167,8 @@ def _assemble(scenario: Scenario, trial: int, robot: Robot) -> Trial:
         vector_of(scenario.robot.q0),
         dt=simulation.dt,
         time_limit=simulation.time_limit,
-        target=target,
+        sensor=Sensor(motion, *errors, OBSTACLES),
+        target=None if target is None else Sensor(target, *errors, TARGET),
     )
     return Trial(scenario, trial, robot, motion, rollout, guard)
 

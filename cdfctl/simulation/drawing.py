@@ -27,9 +27,14 @@ def draw_trial(scenario: Scenario, trial: int, robot: Robot) -> Scenario:
     """
     # A start that is not the robot's is complained of once the trial is drawn: there is no distance to it.
     if not has_rules(scenario) or len(scenario.robot.q0) != robot.n:
-        scenario = without_rules(scenario)
-        return draw(scenario, scenario.seed, trial)
-    return draw(scenario, scenario.seed, trial, RobotGeometry(robot))
+        drawn = draw(without_rules(scenario), scenario.seed, trial)
+    else:
+        drawn = draw(scenario, scenario.seed, trial, RobotGeometry(robot))
+    measurement = scenario.measurement
+    if measurement.exact or measurement.trial is not None:
+        return drawn
+    # As written out, the scenario must have the same errors whatever trial it is run as.
+    return drawn.model_copy(update={"measurement": measurement.model_copy(update={"trial": trial})})
 
 
 def without_rules(scenario: Scenario) -> Scenario:

@@ -16,6 +16,7 @@ from typing import Protocol
 from cdfctl.errors import PlantError
 from cdfctl.simulation.goals import Goal
 from cdfctl.simulation.judge import Stop
+from cdfctl.simulation.measurement import Sensor
 from cdfctl.simulation.motion import SceneMotion
 from cdfctl.simulation.plants import Plant
 from cdfctl.simulation.recorder import Recorder
@@ -65,11 +66,13 @@ class Rollout:
         *,
         dt: float,
         time_limit: float,
-        target: SceneMotion | None = None,
+        sensor: Sensor,
+        target: Sensor | None = None,
     ) -> None:
-        """``q0`` (n,) is the start; ``dt`` and ``time_limit`` are in s; ``target`` is the one body of a reach task."""
+        """``q0`` (n,) is the start; ``dt`` and ``time_limit`` are in s; ``sensor`` is what the controller sees of the
+        obstacles, ``target`` of the one body of a reach task."""
         self._controller, self.plant, self._motion, self._goal = controller, plant, motion, goal
-        self._start, self._dt, self._target = State(0.0, q0), dt, target
+        self._start, self._dt, self._sensor, self._target = State(0.0, q0), dt, sensor, target
         self.max_steps = math.floor(time_limit / dt + 1e-9)  # a limit of 20 s is 200 steps of 0.1 s, not 199
         self.stop: Stop = "error"
         self.reason: str | None = "interrupted"
@@ -84,8 +87,11 @@ class Rollout:
         state, scene = self._start, self._motion.at(self._start.t)
         self._recorder.start(state, scene)
         self._controller.reset()
-        self._controller.step(state, scene, self._target_at(state))
+        self._controller.step(state, *self._seen(state.t, scene))
         self._controller.reset()
+        for sensor in (self._sensor, self._target):
+            if sensor is not None:
+                sensor.restart()
         try:
             yield from self._loop()
         except PlantError as error:
@@ -104,9 +110,9 @@ class Rollout:
                 return self._end("reached")
             if at_end:
                 return self._end("timeout")
-            target = self._target_at(state)
+            seen = self._seen(state.t, scene)
             began = time.perf_counter()
-            decision = controller.step(state, scene, target)
+            decision = controller.step(state, *seen)
             elapsed = time.perf_counter() - began
             if decision.status == "infeasible":
                 return self._end("infeasible")
@@ -118,8 +124,9 @@ class Rollout:
                 self.stop, self.reason = "contact", said
                 return None
 
-    def _target_at(self, state: State) -> Scene | None:
-        return None if self._target is None else self._target.at(state.t)
+    def _seen(self, t: float, scene: Scene) -> tuple[Scene, Scene | None]:
+        """What the controller is told at its next step: the obstacles, and the target."""
+        return self._sensor.see(t, scene), None if self._target is None else self._target.see(t)
 
     def _end(self, stop: Stop) -> None:
         self.stop, self.reason = stop, None
