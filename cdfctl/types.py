@@ -395,7 +395,8 @@ OUTCOMES: tuple[Outcome, ...] = ("reached", "collision", "timeout", "infeasible"
 
 @dataclass(frozen=True)
 class Contact:
-    """First contact of a run: ``time`` (s), robot ``link`` and ``obstacle`` by name."""
+    """First contact of a run: ``time`` (s), robot ``link`` and ``obstacle`` by name; of a robot with itself, the other
+    link in place of an obstacle."""
 
     time: float
     link: str
@@ -414,7 +415,10 @@ class Verdict:
         joint_path: integral of the norm of the joint velocity, rad.
         min_clearance: least signed distance robot-obstacle over the whole run, m; +inf without obstacles.
         min_clearance_time: when, s; None without obstacles.
-        contact: the first contact, None if there was none.
+        contact: the first contact that counts, None if there was none.
+        min_self_clearance: least signed distance of two of the robot's own links that may not touch, m; +inf where all
+            of those are proved to stay apart, or there are none.
+        self_contact: the robot's first contact with itself, whether it counts or not.
     """
 
     outcome: Outcome
@@ -425,6 +429,8 @@ class Verdict:
     min_clearance: float
     min_clearance_time: float | None
     contact: Contact | None
+    min_self_clearance: float = float("inf")
+    self_contact: Contact | None = None
 
     @property
     def success(self) -> bool:

@@ -63,16 +63,17 @@ def run_summary(result: RunResult, run_dir: str, tip: str, notes: Sequence[str] 
 def headline(result: RunResult) -> str:
     """The outcome in one sentence."""
     verdict, simulation = result.verdict, result.scenario.simulation
+    but_itself = "" if verdict.self_contact is None else " but with itself"
     match verdict.outcome:
         case "reached":
-            return f"REACHED in {seconds(verdict.time_to_reach)}, without contact"
+            return f"REACHED in {seconds(verdict.time_to_reach)}, without contact{but_itself}"
         case "collision":
             contact = verdict.contact
             if contact is None:
                 return f"COLLISION: {result.reason}"  # the plant felt what the judge does not see
             return f"COLLISION at {seconds(contact.time)}: {contact.link} touches {contact.obstacle}"
         case "timeout":
-            return f"TIMEOUT: not reached within {simulation.time_limit:g} s, without contact"
+            return f"TIMEOUT: not reached within {simulation.time_limit:g} s, without contact{but_itself}"
         case "infeasible":
             return f"INFEASIBLE at {seconds(float(result.trajectory.t[-1]))}: no velocity satisfies all constraints"
         case "error":
@@ -92,6 +93,7 @@ def figures(result: RunResult, run_dir: str, tip: str) -> list[tuple[str, str]]:
         ("path of the tip", f"{verdict.path_length:.3f} m ({tip})"),
         ("path of the joints", f"{verdict.joint_path:.3f} rad"),
         ("least clearance", clearance(verdict)),
+        *self_clearance(verdict, counts=bool(scenario.controller.self_collision)),
         ("infeasible steps", infeasible),
         *plant_figures(result.plant),
         *measured_figures(result.measured),
@@ -130,6 +132,18 @@ def clearance(verdict: Verdict) -> str:
     if verdict.min_clearance_time is None or not math.isfinite(verdict.min_clearance):
         return "no obstacle"
     return f"{verdict.min_clearance:.4f} m at {seconds(verdict.min_clearance_time)}"
+
+
+def self_clearance(verdict: Verdict, *, counts: bool) -> list[tuple[str, str]]:
+    """The robot's least distance to itself, where that is asked for or there was contact."""
+    contact = verdict.self_contact
+    if math.isinf(verdict.min_self_clearance) or (contact is None and not counts):
+        return []
+    text = f"{verdict.min_self_clearance:.4f} m"
+    if contact is not None:
+        text += f": {contact.link} touches {contact.obstacle} at {seconds(contact.time)}"
+        text += "" if counts else " (not counted: controller.self_collision is 0)"
+    return [("clearance to itself", text)]
 
 
 def seconds(value: float | None) -> str:

@@ -15,9 +15,10 @@ from cdfctl.robots.robot import Robot, load_robot
 from cdfctl.scenario.schema import HoldTask, JointGoalTask, ReachTask, RobotConfig, Scenario
 from cdfctl.scenario.shapes import Body
 from cdfctl.scenario.values import Complaint
+from cdfctl.simulation.advancement import CONTACT
 from cdfctl.simulation.clearance import nearest_each
-from cdfctl.simulation.judge import CONTACT
 from cdfctl.simulation.motion import SceneMotion
+from cdfctl.simulation.self_contact import OwnDistances
 from cdfctl.simulation.shapes import shape_of, vector_of
 
 Place = tuple[str | int, ...]
@@ -77,7 +78,7 @@ def robot_complaints(config: RobotConfig, error: InputError) -> list[Complaint]:
 def scenario_complaints(scenario: Scenario, robot: Robot) -> list[Complaint]:
     """Everything wrong with a drawn and resolved ``scenario`` for ``robot``; empty where it can run."""
     found = [*_configurations(scenario, robot), *_weights(scenario, robot), *_solver(scenario), *_shapes(scenario)]
-    return found or [*_start_in_contact(scenario, robot)]
+    return found or [*_start_in_contact(scenario, robot), *_start_in_self_contact(scenario, robot)]
 
 
 def _configurations(scenario: Scenario, robot: Robot) -> Iterator[Complaint]:
@@ -145,9 +146,24 @@ def _start_in_contact(scenario: Scenario, robot: Robot) -> Iterator[Complaint]:
     scene = SceneMotion(scenario.obstacles).at(0.0)
     for i, found in enumerate(nearest_each(robot, vector_of(scenario.robot.q0), scene)):
         if found.distance <= CONTACT:
-            depth = f"{1e3 * abs(found.distance):.1f} mm deep" if found.distance < 0.0 else "touching"
-            message = f"at the start '{found.obstacle}' is in contact with {found.link} ({depth})"
+            message = f"at the start '{found.obstacle}' is in contact with {found.link} ({_depth(found.distance)})"
             place: Place = (
                 ("obstacles", i, "position") if scenario.obstacles[i].position is not None else ("obstacles", i)
             )
             yield message, "move the obstacle or robot.q0, or draw another trial", place
+
+
+def _start_in_self_contact(scenario: Scenario, robot: Robot) -> Iterator[Complaint]:
+    """Only where the scenario asks for it: hulls may touch where the links do not."""
+    if not scenario.controller.self_collision:
+        return
+    own = OwnDistances(robot)
+    own.place(vector_of(scenario.robot.q0))
+    for (a, b), distance in zip(own.links, own.distances().tolist(), strict=True):
+        if distance <= CONTACT:
+            message = f"at the start {a} is in contact with {b} ({_depth(distance)})"
+            yield message, "move robot.q0, or name the pair in an SRDF, robot.srdf", ("robot", "q0")
+
+
+def _depth(distance: float) -> str:
+    return f"{-1e3 * distance:.1f} mm deep" if distance < 0.0 else "touching"

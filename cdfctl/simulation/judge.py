@@ -1,18 +1,15 @@
 """The judge: scores a rollout by conservative advancement, apart from every field.
 
 Between the recorded states (the control steps, or finer where the plant says what it did in between) the configuration
-moves in a straight line and the obstacles along their closed-form motion. For a pair of bodies whose relative speed is
-at most L, the signed distance d obeys
+moves in a straight line and the obstacles along their closed-form motion. A pair of bodies has a bound on its relative
+speed, which is what :class:`~cdfctl.simulation.advancement.Advancement` searches by.
 
-    | d(t) - d(s) | <= L |t - s|         so on [a, b]         d >= ( d(a) + d(b) - L (b - a) ) / 2
-
-The least clearance follows by halving the intervals whose bound is below the best value seen, until none is lower by
-more than ``CLEARANCE_TOLERANCE``. The first contact follows by stepping ahead by d / L, which cannot jump over one.
+Contact of the robot with itself is always looked for and reported. It is a collision in a scenario that asks its
+controllers to avoid it (``controller.self_collision``); the paper does not speak of it.
 """
 
 from __future__ import annotations
 
-import heapq
 import itertools
 import math
 from typing import Literal, Protocol, TypeAlias
@@ -20,12 +17,14 @@ from typing import Literal, Protocol, TypeAlias
 import numpy as np
 
 from cdfctl.robots.robot import Robot
+from cdfctl.simulation.advancement import CLEARANCE_TOLERANCE, CONTACT, Advancement
 from cdfctl.simulation.clearance import Clearance
+from cdfctl.simulation.self_contact import SelfSweep
 from cdfctl.simulation.speed_bounds import speed_bounds
 from cdfctl.types import Array, Contact, Outcome, Shape, Trajectory, Verdict
 
-CONTACT = 1e-6  # m: contact is d <= CONTACT
-CLEARANCE_TOLERANCE = 1e-4  # m: accuracy of the least clearance
+__all__ = ["CLEARANCE_TOLERANCE", "CONTACT", "Motion", "Stop", "Sweep", "clearance_curve", "judge"]
+
 CHORD = 0.02  # rad (m for a prismatic joint): joint motion between two points of the tip's path
 
 Stop: TypeAlias = Literal["reached", "timeout", "infeasible", "contact", "error"]
@@ -44,16 +43,21 @@ class Motion(Protocol):
     def max_angular_speed(self, i: int, t0: float, t1: float, /) -> float: ...
 
 
-def judge(robot: Robot, motion: Motion, trajectory: Trajectory, stop: Stop) -> Verdict:
+def judge(robot: Robot, motion: Motion, trajectory: Trajectory, stop: Stop, *, self_collision: bool = False) -> Verdict:
     """Score a rollout up to the instant at which it stopped, for the reason ``stop``.
+
+    With ``self_collision``, contact of the robot with itself is a collision too; without, it is reported only.
 
     A plant that failed is ``error``; otherwise the order is collision (the judge's, or one the plant felt), infeasible,
     reached, timeout. A continuous joint must not jump by a turn in ``trajectory.q``.
     """
     sweep = Sweep(robot, motion, trajectory)
+    own = SelfSweep(robot, sweep.t, sweep.q)
     sampled = bool(np.any(sweep.at_steps[sweep.control] <= CONTACT))
-    sweep.find_least()
-    contact = sweep.first_contact() if sweep.best - CLEARANCE_TOLERANCE <= CONTACT else None
+    contact, self_contact = sweep.search(), own.search()
+    if self_collision:
+        sampled = sampled or bool(np.any(own.at_steps[sweep.control] <= CONTACT))
+        contact = min(filter(None, (contact, self_contact)), key=lambda found: found.time, default=None)
     outcome = _outcome(stop, contact is not None)
     return Verdict(
         outcome=outcome,
@@ -64,6 +68,8 @@ def judge(robot: Robot, motion: Motion, trajectory: Trajectory, stop: Stop) -> V
         min_clearance=sweep.best,
         min_clearance_time=None if math.isinf(sweep.best) else sweep.best_time,
         contact=contact,
+        min_self_clearance=own.best,
+        self_contact=self_contact,
     )
 
 
@@ -98,13 +104,11 @@ def _outcome(stop: Stop, collided: bool) -> Outcome:
     return "collision" if collided or stop == "contact" else stop
 
 
-class Sweep:
-    """The distances of one run: known at N+1 recorded states, searched in between.
+class Sweep(Advancement):
+    """The distances of robot and obstacles: known at N+1 recorded states, searched in between.
 
     Attributes:
-        at_steps: (N+1, pairs) signed distances at the recorded states, m.
-        control: which of them are the control steps.
-        best, best_time, best_pair: the least distance evaluated so far (m), when (s), and of which pair.
+        control: which of the states are the control steps.
     """
 
     def __init__(self, robot: Robot, motion: Motion, trajectory: Trajectory) -> None:
@@ -118,10 +122,7 @@ class Sweep:
             self.at_steps[k] = self.clearance.distances()
             frames.append(self.clearance.joint_frames())
             centres.append(self.clearance.robot_centres())
-        self.best, self.best_time, self.best_pair = math.inf, 0.0, -1
-        if self.at_steps.size:
-            k, pair = divmod(int(np.argmin(self.at_steps)), self.at_steps.shape[1])
-            self._note(float(self.at_steps[k, pair]), float(self.t[k]), pair)
+        self.start()
         rotations, origins = (np.array(part) for part in zip(*frames, strict=True))
         self.speed = self._speeds(rotations, origins, np.array(centres))
 
@@ -138,69 +139,14 @@ class Sweep:
                 obstacle[k, i] = self.motion.max_speed(i, t0, t1) + turning * reach
         return (robot[:, :, None] + obstacle[:, None, :]).reshape(len(self.t) - 1, self.at_steps.shape[1])
 
-    def _bounds(self, k: int) -> Array:
-        """Lower bounds (pairs,) of the distances within step ``k``."""
-        bounds: Array = 0.5 * (self.at_steps[k] + self.at_steps[k + 1] - self.speed[k] * (self.t[k + 1] - self.t[k]))
-        return bounds
-
-    def _measure(self, k: int, pair: int, t: float) -> float:
-        """Distance of a pair at time ``t`` within step ``k``; the least one is kept."""
+    def distance_at(self, k: int, pair: int, t: float) -> float:
+        """Signed distance of a pair at time ``t`` within interval ``k``, m."""
         t0, t1 = self.t[k], self.t[k + 1]
         q = self.q[k] + (self.q[k + 1] - self.q[k]) * ((t - t0) / (t1 - t0))
         self.clearance.place(q, self.motion.poses(t))
-        d = self.clearance.distance(pair)
-        self._note(d, t, pair)
-        return d
+        return self.clearance.distance(pair)
 
-    def _note(self, distance: float, t: float, pair: int) -> None:
-        if distance < self.best:
-            self.best, self.best_time, self.best_pair = distance, t, pair
-
-    def find_least(self) -> None:
-        """Search between the recorded states until ``best`` is within ``CLEARANCE_TOLERANCE`` of the run's least."""
-        heap: list[tuple[float, int, int, float, float, float, float]] = []
-
-        def push(k: int, pair: int, a: float, b: float, d_a: float, d_b: float, speed: float) -> None:
-            bound = 0.5 * (d_a + d_b - speed * (b - a))
-            if bound < self.best - CLEARANCE_TOLERANCE:
-                heapq.heappush(heap, (bound, k, pair, a, b, d_a, d_b))
-
-        for k in range(len(self.t) - 1):
-            for pair in np.flatnonzero(self._bounds(k) < self.best - CLEARANCE_TOLERANCE).tolist():
-                before, after = float(self.at_steps[k, pair]), float(self.at_steps[k + 1, pair])
-                push(k, pair, float(self.t[k]), float(self.t[k + 1]), before, after, float(self.speed[k, pair]))
-        while heap and heap[0][0] < self.best - CLEARANCE_TOLERANCE:
-            _, k, pair, a, b, d_a, d_b = heapq.heappop(heap)
-            middle, speed = 0.5 * (a + b), float(self.speed[k, pair])
-            d = self._measure(k, pair, middle)
-            push(k, pair, a, middle, d_a, d, speed)
-            push(k, pair, middle, b, d, d_b, speed)
-
-    def first_contact(self) -> Contact | None:
-        """The first contact of the run: every pair advances by steps of ``d / L``, one interval after the other."""
-        for k in range(len(self.t) - 1):
-            start, end = float(self.t[k]), float(self.t[k + 1])
-            found: tuple[float, int] | None = None
-            for pair in np.flatnonzero(self._bounds(k) <= CONTACT).tolist():
-                time = self._advance(k, pair, start, end if found is None else found[0])
-                if time is not None:
-                    found = (time, pair)
-            if found is not None:
-                return self._contact(*found)
-        # what is left: contact at the very end, or one that touches by less than CONTACT
-        return self._contact(self.best_time, self.best_pair) if self.best <= CONTACT else None
-
-    def _advance(self, k: int, pair: int, start: float, end: float) -> float | None:
-        """The first contact of a pair in [start, end), None where there is none."""
-        t = start
-        while t < end:
-            d = self._measure(k, pair, t)
-            if d <= CONTACT:
-                return t
-            # at least CONTACT / L, within which a distance above CONTACT cannot fall below zero
-            t += max(d - CONTACT, CONTACT) / max(float(self.speed[k, pair]), 1e-12)
-        return None
-
-    def _contact(self, time: float, pair: int) -> Contact:
+    def contact_of(self, time: float, pair: int) -> Contact:
+        """The contact of a pair at ``time``, by name."""
         m = self.clearance.obstacles
         return Contact(time, self.robot.geometry_links[pair // m], self.motion.names[pair % m])

@@ -66,6 +66,8 @@ class RunResult:
             "step_ms": step_milliseconds(trajectory),
             "run_dir": run_dir,
             "plant": {name: _number(x) if isinstance(x, float) else x for name, x in self.plant.items()},
+            "min_self_clearance_m": _number(verdict.min_self_clearance),
+            "self_contact_time_s": _number(verdict.self_contact.time if verdict.self_contact is not None else None),
         }
         return document if self.measured is None else {**document, "measured": dict(self.measured)}
 

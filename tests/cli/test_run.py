@@ -36,6 +36,8 @@ KEYS = {
     "step_ms": dict,
     "run_dir": str,
     "plant": dict,
+    "min_self_clearance_m": float | None,
+    "self_contact_time_s": float | None,
 }
 FILES = {"scenario.yaml", "result.json", "trajectory.npz"}
 NEVER = "simulation.time_limit=0.2"

@@ -39,6 +39,8 @@ KEYS = [
     "step_ms",
     "run_dir",
     "plant",
+    "min_self_clearance_m",
+    "self_contact_time_s",
 ]
 
 
