@@ -118,6 +118,7 @@ def check(seed: int, steps: int) -> dict[str, int]:
     return counts
 
 
+@pytest.mark.timeout(7200)
 @pytest.mark.parametrize(
     ("first", "draws"), [(0, 120), *[pytest.param(10_000 * k, 5_000, marks=pytest.mark.long) for k in range(1, 5)]]
 )

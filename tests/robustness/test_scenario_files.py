@@ -13,9 +13,10 @@ import pytest
 
 HERE = Path(__file__).parent
 SCENARIOS = HERE.parents[1] / "scenarios"
-SLOW = 5.0  # s
+SLOW = 5.0  # s of processor time
 
 
+@pytest.mark.timeout(7200)
 @pytest.mark.parametrize(
     ("seed", "count"),
     [(0, 200), pytest.param(1, 5000, marks=pytest.mark.long), pytest.param(2, 5000, marks=pytest.mark.long)],
