@@ -37,6 +37,8 @@ def parse_sweep(text: str) -> tuple[Setting, ...]:
     if not equals:
         raise InputError(f"{FLAG} {text}: expected FIELD=a,b,c", "for example --sweep controller.alpha=1,2,3")
     parts = _split(values)
+    if not all(parts):
+        raise InputError(f"{FLAG} {text}: the value is missing", "for example --sweep controller.alpha=1,2,3")
     if len(set(parts)) != len(parts):
         raise InputError(f"{FLAG} {text}: the same value twice")
     overrides = [parse_override(f"{field}={part}", FLAG) for part in parts]

@@ -10,6 +10,7 @@ from rich.text import Text
 
 from cdfctl.benchmark.statistics import CellSummary
 from cdfctl.report import bench_rows as rows
+from cdfctl.report.bench_grid import grid_table, sweep_grids
 from cdfctl.report.tables import bullets
 
 SUCCESS = ("success", "ci95", "solvable", "sampled", "p", "collided", "timeout", "infeasible", "error")
@@ -24,6 +25,8 @@ def bench_table(summaries: Sequence[CellSummary]) -> RenderableType:
         parts.append(Text(group.title, style="bold"))
         parts += [_table(group, columns) for columns in (SUCCESS, MOTION, STEPS)]
         parts.append(Text())
+    for grid in sweep_grids(summaries):
+        parts += [Text(grid.title, style="bold"), grid_table(grid), Text()]
     parts.append(bullets(rows.LEGEND))
     notes = (
         ("What can be solved", rows.solvable(summaries)),

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from cdfctl.benchmark.document import paper_cell
 from cdfctl.benchmark.statistics import CellSummary
 from cdfctl.report import bench_rows as rows
+from cdfctl.report.bench_grid import grid_markdown, sweep_grids
 
 SPECIAL = {"%": r"\%", "_": r"\_", "&": r"\&", "#": r"\#", "<": "$<$", "[": "{[}", "]": "{]}"}
 
@@ -26,6 +27,8 @@ def markdown(summaries: Sequence[CellSummary]) -> str:
             cells = (line.cells.get(column, "").replace("*", r"\*").replace("<", r"\<") for column in shown)
             parts.append(f"| {title} | " + " | ".join(cells) + " |")
         parts.append("")
+    for grid in sweep_grids(summaries):
+        parts += grid_markdown(grid)
     for items in (rows.LEGEND, rows.solvable(summaries), rows.notes(summaries), rows.assumptions(summaries)):
         parts += [f"- {item.replace('*', chr(92) + '*').replace('+ ', chr(92) + '+ ')}" for item in items]
         parts += [""] * bool(items)

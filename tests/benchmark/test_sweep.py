@@ -28,6 +28,8 @@ def test_several_make_a_grid_the_last_changing_fastest() -> None:
     [
         (["controller.alpha"], "expected FIELD=a,b,c"),
         (["controller.alpha=1,,2"], "the value is missing"),
+        (["controller.alpha="], "the value is missing"),
+        (["controller.alpha=,"], "the value is missing"),
         (["controller.alpha=1,1"], "the same value twice"),
         (["..=1"], "not the path of a field"),
         (["controller.alpha=1", "controller.alpha=2"], "given twice"),
