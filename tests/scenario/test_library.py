@@ -28,7 +28,8 @@ from cdfctl.scenario.yaml_loader import read
 
 from .conftest import GOOD
 
-NAMES = ["C1", "C2", "C3", "S1", "S2", "S3", "X1", "X2", "X3", "X4", "planar-1", "reach-collinear", "reach"]
+REAL = ["real-fast", "real-slow"]
+NAMES = ["C1", "C2", "C3", "S1", "S2", "S3", "X1", "X2", "X3", "X4", "planar-1", "reach-collinear", "reach", *REAL]
 POSE = (0.35, -0.32, -1.70, 0.18, 2.05, -0.20)
 
 
@@ -45,11 +46,22 @@ def test_shipped_scenarios(name):
     assert scenario.assumptions
     assert scenario.controller.variant == ("cdf-tvcbf-tvclf-qp" if name.startswith("reach") else "dual-tvcbf-qp")
     check_runnable(scenario)
+    assert has_draws(scenario) == (name[0] in "SCX")
+    if name in REAL:
+        return
     assert scenario.robot.limits.velocity == (1.0 if name in ("X3", "X4") else 2.0)
     assert (scenario.simulation.dt, scenario.simulation.time_limit) == (0.1, 20.0)
     if not name.startswith("reach"):
         assert scenario.controller.gain == (4.0 if scenario.robot.name == "franka" else 9.9)
-    assert has_draws(scenario) == (name[0] in "SCX")
+
+
+def test_the_real_experiments_differ_in_their_speed_only():
+    fast, slow = (load_scenario(name).scenario.model_dump() for name in REAL)
+    for scenario, speed in ((fast, -0.15), (slow, -0.05)):
+        for obstacle in scenario["obstacles"]:
+            assert obstacle.pop("velocity") == (0.0, 0.0, speed)
+        del scenario["name"], scenario["description"]
+    assert fast == slow
 
 
 @pytest.mark.parametrize("name", NAMES)
