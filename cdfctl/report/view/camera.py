@@ -13,6 +13,9 @@ from cdfctl.types import Array
 FIELD_OF_VIEW = math.radians(40.0)
 ASPECT = 1.2
 """Width over height of the part of a window that nothing covers."""
+NEAR = 0.75
+"""Obstacles this near to the base, as a share of the robot's size, are to be in the picture too."""
+
 FLAT = 1e-3
 """An arm whose joints and tip stay within this height (m) moves in a plane, and is looked at from above."""
 
@@ -33,14 +36,16 @@ class Camera:
 
     @classmethod
     def of(cls, replay: Replay) -> Camera:
-        """A camera that has every joint and the tip in view over the whole run, and a margin around them."""
+        """A camera that has every joint and the tip in view over the whole run, the goal, and the obstacles near by."""
         body = replay.body
         every = max(1, len(replay.path_q) // 40)
         seen = [*replay.path_q[::every], *([] if body.goal is None else [body.goal])]
         points = np.concatenate([body.skeleton(q) for q in seen] + [np.zeros((1, 3))])
-        low, high = points.min(axis=0), points.max(axis=0)
         size = size_of(body)
-        flat = high[2] - low[2] < FLAT
+        low, high = points.min(axis=0), points.max(axis=0)
+        flat, floor = high[2] - low[2] < FLAT, float(low[2])
+        points = np.concatenate([points, _near(replay, NEAR * size, 0.2 * size)])
+        low, high = points.min(axis=0), points.max(axis=0)
         direction = np.array([0.0, 0.0, 1.0]) if flat else DIRECTION / np.linalg.norm(DIRECTION)
         up = np.array([0.0, 1.0, 0.0]) if flat else np.array([0.0, 0.0, 1.0])
         centre = 0.5 * (low + high)
@@ -51,7 +56,7 @@ class Camera:
             centre,
             up,
             FIELD_OF_VIEW,
-            float(low[2]) - (0.02 * size if flat else 0.0),
+            floor - (0.02 * size if flat else 0.0),
             grid,
         )
 
@@ -64,6 +69,16 @@ class Camera:
         values = {"position": self.position + shift, "look_at": self.look_at + shift, "up": self.up, "fov": self.fov}
         for name, value in values.items():
             setattr(initial_camera, name, value)
+
+
+def _near(replay: Replay, reach: float, most: float) -> Array:
+    """The corners (k, 3) of the obstacles while they are within ``reach`` (m) of the base, at ``most`` (m) large."""
+    extent = np.minimum(replay.body.clearance.reach, most)
+    poses = replay.trajectory.obstacle_pose[:: max(1, len(replay.trajectory.t) // 40), :, :3]
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    close = np.linalg.norm(poses, axis=2) < reach
+    around = poses[:, :, None] + extent[None, :, None, None] * corners / math.sqrt(3.0)
+    return np.asarray(around[close].reshape(-1, 3))
 
 
 def _distance(points: Array, direction: Array, up: Array, padding: float) -> float:

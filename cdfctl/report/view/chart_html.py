@@ -81,9 +81,11 @@ def _drawing(chart: Chart, span: float, infeasible: Array) -> str:
     for value in _ticks(low, high, 3):
         label = f'<text x="{LEFT - 5}" y="{y(value) + 3:.1f}" text-anchor="end">{value:g}</text>'
         parts += [_line(LEFT, y(value), right, y(value), "#e3e6ea"), label]
-    for t in _ticks(0.0, span, 5):
-        parts.append(f'<text x="{_x(t, span):.1f}" y="{HEIGHT - 5}" text-anchor="middle">{t:g}</text>')
-    parts.append(f'<text x="{right}" y="{HEIGHT - 5}" text-anchor="start"> s</text>')
+    times = _ticks(0.0, span, 5)
+    for t in times:
+        label = f"{t:g} s" if t == times[-1] else f"{t:g}"
+        x = min(_x(t, span), WIDTH - 3.2 * len(label))  # a label at the end must not be cut off
+        parts.append(f'<text x="{x:.1f}" y="{HEIGHT - 5}" text-anchor="middle">{label}</text>')
     parts.append(_line(LEFT, y(chart.level), right, y(chart.level), "#20262d", 'stroke-dasharray="4 3"'))
     for curve in chart.curves:
         path = "".join(f"{pen}{_x(t, span):.1f} {y(value):.1f}" for pen, t, value in _strokes(chart.t, curve))

@@ -34,7 +34,7 @@ GROUPS = {
 HIDDEN = ("collision",)
 """The groups that are hidden to begin with."""
 
-CLOUD_BALLS = 3000
+CLOUD_BALLS = 1000
 """A cloud of more points than this is drawn as points, not as balls."""
 
 
@@ -174,10 +174,10 @@ class Stage:
     def _cloud(self, path: str, cloud: PointCloud, colour: str) -> Any:
         if cloud.radius > 0.0 and len(cloud.points) <= CLOUD_BALLS:
             ball = triangles_of(Sphere(cloud.radius), rgb(colour), detail=1)
-            turns = np.tile([1.0, 0.0, 0.0, 0.0], (len(cloud.points), 1))
-            return self._scene.add_batched_meshes_simple(
-                path, ball.vertices, ball.faces, turns, cloud.points, batched_colors=ball.colour, lod="off"
-            )
+            vertices = (cloud.points[:, None] + ball.vertices).reshape(-1, 3)
+            first = len(ball.vertices) * np.arange(len(cloud.points))
+            faces = (first[:, None, None] + ball.faces).reshape(-1, 3)
+            return self._surface(path, Triangles(vertices, faces, ball.colour, smooth=True), None)
         return self._scene.add_point_cloud(
             path,
             cloud.points,
@@ -196,6 +196,7 @@ class Stage:
             flat_shading=not surface.smooth,
             opacity=opacity,
             cast_shadow=opacity is None,
+            receive_shadow=False,  # flat faces would show stripes
             **place,
         )
 
