@@ -61,13 +61,16 @@ def solvable(scenario: Scenario, robot: Robot) -> Solvable:
     problem = problem_of(scenario, robot)
     fastest = float(robot.velocity_limit.max()) * problem.dt
     width = math.inf
+    # The motions turn at once: where accelerations are limited they prove nothing, but impossible stays impossible.
+    abrupt = bool(np.isinf(robot.acceleration_limit).all())
     for greatest in WIDTHS:
         parts = math.ceil(fastest / greatest)
         width = fastest / parts
-        found = search(problem, parts, "inner", MARGIN * width)
+        found = search(problem, parts, "inner", MARGIN * width) if abrupt else None
         if found is not None:
             motion = driven(found, problem)
-            verdict = judge(robot, problem.motion, motion, "reached")
+            own = bool(scenario.controller.self_collision)
+            verdict = judge(robot, problem.motion, motion, "reached", self_collision=own)
             if verdict.success:
                 return Solvable("yes", width, verdict, motion)
         if search(problem, parts, "outer") is None:

@@ -85,7 +85,8 @@ def check_solvable(scenario: Scenario) -> None:
 def problem_id(cell: Cell) -> str:
     """The same for cells whose trials are the same set-ups, asked of the same code."""
     scenario = cell.scenario.model_dump(mode="json", exclude_none=True, exclude=APART)
-    return digest({"scenario": scenario, "bound": _source()})
+    own = bool(cell.scenario.controller.self_collision)  # the one thing in it that the judge asks for
+    return digest({"scenario": scenario, "self_collision": own, "bound": _source()})
 
 
 @cache

@@ -143,6 +143,11 @@ def test_a_goal_from_a_time_on_and_a_hold(make):
     assert solvable(hold, robot).verdict.time_to_reach == pytest.approx(4.0)
 
 
+def test_where_accelerations_are_limited_only_impossible_is_proved(make):
+    slow, robot = make(**{"velocity: 2.0": "velocity: 2.0, acceleration: 5.0"})
+    assert solvable(slow, robot).answer == "open"
+
+
 WHEEL = """\
 <robot name="wheels">
   <link name="base"/>
