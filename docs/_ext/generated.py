@@ -116,12 +116,13 @@ def replace(app: Sphinx, docname: str, source: list[str]) -> None:
 
 def draw(app: Sphinx) -> None:
     """Draw the figures of the pages, before the pages are read."""
-    from cdfctl.report.figures import save_figure
-    from cdfctl.report.figures_levels import levels_figure
+    from cdfctl.report.figures.levels import levels
+    from cdfctl.report.figures.output import save_figure
+    from cdfctl.report.figures.part import figure_of
 
     folder = Path(app.srcdir) / "_figures"
     folder.mkdir(exist_ok=True)
-    save_figure(levels_figure(), folder / "levels.png")
+    save_figure(figure_of([levels()]), folder / "levels.png")
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -1,0 +1,72 @@
+"""Which figures there are: of a run, of a benchmark, and of the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from cdfctl.benchmark.reading import is_store, read_store
+from cdfctl.errors import InputError, unknown_name
+from cdfctl.report.figures.avoidance import avoidance
+from cdfctl.report.figures.bench_panels import bench_parts
+from cdfctl.report.figures.joint_space import default_instants, joint_space
+from cdfctl.report.figures.levels import levels
+from cdfctl.report.figures.part import OVERVIEW, Part
+from cdfctl.report.figures.reaching import reaching
+from cdfctl.report.figures.run_view import view_run
+from cdfctl.report.figures.sweep import sweep_part, swept
+from cdfctl.report.figures.task_space import task_space
+from cdfctl.report.figures.time_course import time_course
+
+PAPER = {"levels": levels, "avoidance": avoidance, "reaching": reaching}
+"""Figures that need no source: they run what they show."""
+
+
+def paper_parts(names: Sequence[str]) -> list[Part]:
+    """The paper's figures of these names. Raises :class:`InputError` for a name that is none of them."""
+    for name in names:
+        if name not in PAPER:
+            raise unknown_name("figure", name, PAPER)
+    return [PAPER[name]() for name in names]
+
+
+def source_parts(source: Path, names: Sequence[str], fields: tuple[str, ...] | None, at: Sequence[float]) -> list[Part]:
+    """The figures of these names of a run or a benchmark; all there are where there is no name or ``overview``.
+
+    Args:
+        source: a run folder, or a benchmark's.
+        names: of figures.
+        fields: of the plane of the joints, ``cdf`` and ``sdf``; None for the controller's.
+        at: instants of the plane of the joints, s; none for those that are chosen by themselves.
+
+    Raises:
+        InputError: the source is neither, or damaged; a name is unknown; ``fields`` or ``at`` do not apply.
+    """
+    bench = is_store(source)
+    parts = _of_bench(source, fields, at) if bench else _of_run(source, fields, at)
+    if not names or list(names) == [OVERVIEW]:
+        # Of a sweep, the panels of the other figures would be one a combination: they are there to be asked for.
+        return parts[:1] if parts[0].name == "sweep" else parts
+    by_name = {part.name: part for part in parts}
+    for name in names:
+        if name not in by_name:
+            raise unknown_name("figure", name, [*by_name, OVERVIEW])
+    return [by_name[name] for name in names]
+
+
+def _of_bench(source: Path, fields: tuple[str, ...] | None, at: Sequence[float]) -> list[Part]:
+    if fields is not None or at:
+        raise InputError("--field and --at are for runs, and this is a benchmark")
+    bench = read_store(source)
+    return [*([sweep_part(bench)] if swept(bench) else []), *bench_parts(bench)]
+
+
+def _of_run(source: Path, fields: tuple[str, ...] | None, at: Sequence[float]) -> list[Part]:
+    view = view_run(source)
+    parts = [task_space(view)] if view.in_plane else []
+    if view.two_joints:
+        instants = sorted({view.step_at(t) for t in at}) if at else default_instants(view)
+        parts.append(joint_space(view, fields or view.field_names, instants))
+    elif fields is not None or at:
+        raise InputError(f"--field and --at need a robot of two joints, and '{view.robot.name}' is none")
+    return [*parts, time_course(view)]
