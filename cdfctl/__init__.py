@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from cdfctl.control.safety_filter import SafetyFilter
     from cdfctl.errors import CdfctlError
     from cdfctl.fields.field import make_field
-    from cdfctl.robots.robot import load_robot
-    from cdfctl.types import Box, Capsule, ConvexMesh, Cylinder, Obstacle, PointCloud, Scene, Sphere
+    from cdfctl.robots.robot import Robot, load_robot
+    from cdfctl.types import Box, Capsule, ConvexMesh, Cylinder, Decision, Obstacle, PointCloud, Scene, Sphere
 
 __version__ = "0.1.0"
 
@@ -32,8 +32,10 @@ __all__ = [
     "CdfctlError",
     "ConvexMesh",
     "Cylinder",
+    "Decision",
     "Obstacle",
     "PointCloud",
+    "Robot",
     "SafetyFilter",
     "Scene",
     "Sphere",
@@ -48,8 +50,10 @@ _HOME = {
     "CdfctlError": "cdfctl.errors",
     "ConvexMesh": "cdfctl.types",
     "Cylinder": "cdfctl.types",
+    "Decision": "cdfctl.types",
     "Obstacle": "cdfctl.types",
     "PointCloud": "cdfctl.types",
+    "Robot": "cdfctl.robots.robot",
     "SafetyFilter": "cdfctl.control.safety_filter",
     "Scene": "cdfctl.types",
     "Sphere": "cdfctl.types",

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -197,7 +197,7 @@ class Scene:
 
     def __init__(self, obstacles: Iterable[Obstacle] = ()) -> None:
         items = list(obstacles)
-        self.shapes = tuple(o.shape for o in items)
+        self.shapes = _same(tuple(o.shape for o in items))
         self.names = tuple(o.name if o.name is not None else str(i) for i, o in enumerate(items))
         if len(set(self.names)) != len(self.names):
             raise InputError(f"obstacle names must differ, found {list(self.names)}")
@@ -225,6 +225,20 @@ class Scene:
             Obstacle(shape, pose[:3], pose[3:], twist[:3], twist[3:], name)
             for shape, pose, twist, name in zip(self.shapes, self.poses, self.twists, self.names, strict=True)
         )
+
+
+def _same(shapes: tuple[Shape, ...]) -> tuple[Shape, ...]:
+    """``shapes``, or equal ones of a scene before: a loop that makes its scene anew at every step has its shapes
+    converted once. Meshes and clouds are equal to themselves only."""
+    try:
+        return _recent(shapes)
+    except TypeError:  # a radius that has no hash
+        return shapes
+
+
+@lru_cache(maxsize=8)
+def _recent(shapes: tuple[Shape, ...]) -> tuple[Shape, ...]:
+    return shapes
 
 
 @dataclass(frozen=True)

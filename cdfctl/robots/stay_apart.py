@@ -22,11 +22,10 @@ from cdfctl.robots.coal_geometry import bounding_ball
 from cdfctl.robots.robot import Robot
 from cdfctl.types import Array, IntArray
 
-MOST_BOXES = 30_000  # a third of a second
 
-
-def stays_apart(robot: Robot, pair: tuple[int, int], distance: float, most_boxes: int = MOST_BOXES) -> bool:
-    """Whether it is proved that two objects of ``robot.geometry`` stay ``distance`` (m) apart within the joint limits.
+def stays_apart(robot: Robot, pair: tuple[int, int], distance: float, most_boxes: int) -> tuple[bool, int]:
+    """Whether it is proved that two objects of ``robot.geometry`` stay ``distance`` (m) apart within the joint limits,
+    and how many boxes that took; no more than ``most_boxes``.
 
     False is no proof of the contrary.
     """
@@ -36,7 +35,7 @@ def stays_apart(robot: Robot, pair: tuple[int, int], distance: float, most_boxes
     low = np.where(np.isfinite(robot.lower), robot.lower, np.where(robot.prismatic, -math.inf, -math.pi))[joints]
     high = np.where(np.isfinite(robot.upper), robot.upper, np.where(robot.prismatic, math.inf, math.pi))[joints]
     if not np.isfinite(high - low).all():
-        return False
+        return False, 0
     geometry = pin.GeometryModel(robot.geometry)
     geometry.addCollisionPair(pin.CollisionPair(*pair))
     data, placed = robot.model.createData(), pin.GeometryData(geometry)
@@ -44,13 +43,15 @@ def stays_apart(robot: Robot, pair: tuple[int, int], distance: float, most_boxes
     boxes = [(0.5 * (low + high), 0.5 * (high - low))]
     looked_at = 0
     while boxes:
+        if looked_at >= most_boxes:
+            return False, looked_at
         centre, half = boxes.pop()
         looked_at += 1
         q[joints] = centre
         pin.updateGeometryPlacements(robot.model, data, geometry, placed, q)
         d = float(pin.computeDistance(geometry, placed, 0).min_distance)
-        if d < distance or looked_at > most_boxes:
-            return False
+        if d < distance:
+            return False, looked_at
         ways = reach * half
         if d - ways.sum() < distance:
             widest = int(np.argmax(ways))
@@ -60,7 +61,7 @@ def stays_apart(robot: Robot, pair: tuple[int, int], distance: float, most_boxes
                 moved = centre.copy()
                 moved[widest] += side
                 boxes.append((moved, half))
-    return True
+    return True, looked_at
 
 
 def reaches(robot: Robot, pair: tuple[int, int]) -> tuple[IntArray, Array]:

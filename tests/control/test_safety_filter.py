@@ -173,6 +173,19 @@ def test_the_caller_may_change_the_command_it_got():
     assert safe.step([0, 0], Scene(), [9.0, 9.0]).u == pytest.approx([1.5, 1.5])
 
 
+def test_a_scene_made_anew_keeps_its_shapes():
+    """What a field converts them for, once instead of at every step."""
+    cloud = PointCloud([[0.0, 0.0, 0.0]], 0.1)
+
+    def scene(radius=0.3, points=cloud):
+        return Scene([Obstacle(Sphere(radius), [2.0, 2.5, 0.0]), Obstacle(points, [0, 0, 0])])
+
+    assert scene().shapes is scene().shapes
+    assert scene(0.2).shapes is not scene().shapes
+    assert scene(points=PointCloud([[0.0, 0.0, 0.0]], 0.1)).shapes is not scene().shapes
+    assert scene(np.array(0.3)).shapes[0].radius == 0.3
+
+
 def test_it_says_what_holds_it(planar):
     scene = Scene([Obstacle(Sphere(0.3), [2.0, 2.5, 0.0], name="disc")])
     safe = SafetyFilter(planar, "sdf-tvcbf-qp", dt=0.1)

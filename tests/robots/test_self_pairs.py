@@ -16,6 +16,8 @@ from cdfctl.robots.robot import load_robot
 from cdfctl.robots.self_pairs import APART, candidate_pairs, find_pairs, self_pairs
 from cdfctl.robots.stay_apart import reaches, stays_apart
 
+MOST = 30_000
+
 
 @pytest.fixture(scope="module")
 def franka():
@@ -55,7 +57,7 @@ def test_a_proof_agrees_with_the_closed_form(write_urdf, xml, limit):
     assert candidate_pairs(robot) == (pair,)
     assert reaches(robot, pair)[0].tolist() == [0, 1, 2]
     for distance in (least - 0.02, least + 0.02):
-        assert stays_apart(robot, pair, distance) == (distance < least)
+        assert stays_apart(robot, pair, distance, MOST)[0] == (distance < least)
     found = find_pairs(robot, (pair,))
     assert (found.apart == (pair,)) == (least > APART)
 
@@ -66,8 +68,9 @@ def test_a_sliding_joint_counts_its_travel(write_urdf, xml):
     joints, reach = reaches(robot, (0, 2))
     assert reach[joints == 2] == 1.0
     least = 2.0 * np.cos(0.25) - 0.2
-    assert stays_apart(robot, (0, 2), least - 0.02)
-    assert not stays_apart(robot, (0, 2), least + 0.02)
+    assert stays_apart(robot, (0, 2), least - 0.02, MOST)[0]
+    assert not stays_apart(robot, (0, 2), least + 0.02, MOST)[0]
+    assert stays_apart(robot, (0, 2), least - 0.02, 5) == (False, 5)
 
 
 @settings(max_examples=30)
