@@ -12,7 +12,7 @@ from cdfctl.errors import InputError
 from cdfctl.scenario.feed import FeedConfig
 
 MAX_LINE = 65536
-"""Longest line, bytes; what is longer is one line of garbage."""
+"""Longest line, bytes; what is longer is garbage."""
 
 MAX_READ = 1 << 20
 """Most bytes taken at one control step: a flood must not hold the loop up."""
@@ -38,8 +38,12 @@ class UdpSource:
         try:
             family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
             self._socket = socket.socket(family, kind, protocol)
-            self._socket.setblocking(False)
-            self._socket.bind(address)
+            try:
+                self._socket.setblocking(False)
+                self._socket.bind(address)
+            except OSError:
+                self._socket.close()
+                raise
         except OSError as error:
             raise InputError(f"obstacles: cannot listen at {host}:{port}: {error.strerror or error}") from None
 
