@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from cdfctl.control.solvers import check_solver
 from cdfctl.errors import InputError, name_hint
 from cdfctl.robots.robot import Robot, load_robot
 from cdfctl.scenario.schema import HoldTask, JointGoalTask, ReachTask, RobotConfig, Scenario
@@ -124,6 +123,8 @@ def _weights(scenario: Scenario, robot: Robot) -> Iterator[Complaint]:
 def _solver(scenario: Scenario) -> Iterator[Complaint]:
     if scenario.controller.solver is None:
         return
+    from cdfctl.control.solvers import check_solver  # loads every solver: not for who only wants a robot
+
     try:
         check_solver(scenario.controller.solver)
     except InputError as error:
