@@ -82,6 +82,7 @@ def build_model(robot: Robot, shapes: Sequence[Shape], config: MujocoConfig) -> 
     spec.compiler.boundmass, spec.compiler.boundinertia = LEAST_MASS, LEAST_INERTIA
     spec.option.timestep = config.timestep
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a plant that is lost must not begin anew
     bodies, assumed = _bodies(spec, robot, config.gravity_compensation)
     owners: dict[str, int] = {}
     for i, shape in enumerate(shapes):

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from cdfctl.errors import InputError, MissingError
+from cdfctl.errors import InputError, MissingError, PlantError
 from cdfctl.robots.robot import Robot, load_robot
 from cdfctl.robots.robot_file import shipped_names
 from cdfctl.scenario.library import load_scenario
@@ -153,6 +153,14 @@ def test_every_arm_follows_its_servos(arm: Robot) -> None:
     u = 0.2 * rng.uniform(-1.0, 1.0, robot.n) * np.minimum(robot.velocity_limit, 3.0)
     drive(plant, robot.home, u, 0.4)
     assert np.abs(plant._data.qvel - u).max() < (0.006 if arm.name in ("franka", "fr3") else 0.02)
+
+
+def test_physics_that_run_away_are_a_failure_of_the_plant(one_joint: Robot) -> None:
+    plant = MujocoPlant(one_joint, STILL, config(), 0.01)
+    state = plant.start(np.zeros(1))
+    plant._data.qvel[:] = math.nan
+    with pytest.raises(PlantError, match="became unstable at 0 s"):
+        plant.step(state, np.zeros(1), 0.01)
 
 
 RAM = """\
