@@ -150,13 +150,15 @@ class JournalReader:
         self.scenario = load_scenario(live / SCENARIO).scenario
         try:
             self._file = (live / STEPS).open("rb")
+        except OSError as error:
+            raise InputError(f"{live}: cannot be read: {error.strerror or error}") from None
+        try:
             header = json.loads(self._file.readline())
             if header["format"] != FORMAT or header["version"] != VERSION:
                 raise ValueError(f"format {header['format']} {header['version']}")
             self._fields = [(str(name), tuple(shape)) for name, shape in header["fields"]]
-        except OSError as error:
-            raise InputError(f"{live}: cannot be read: {error.strerror or error}") from None
         except (ValueError, KeyError, TypeError) as error:
+            self._file.close()
             raise InputError(f"{live / STEPS}: not a run in progress of this cdfctl: {error}") from None
         self._width = sum(math.prod(shape) for _, shape in self._fields)
         self._rest = b""

@@ -52,7 +52,7 @@
   (function follow() {
     const slider = document.querySelector('[role="slider"][aria-valuenow]');
     const t = slider === null ? 0 : Number(slider.getAttribute("aria-valuenow"));
-    if (still && slider !== null) {
+    if (still && t > 0) {  // not before: at its first tick the player builds the scene
       still = false;
       window.dispatchEvent(new KeyboardEvent("keydown", { code: "Space" }));
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import time
 from typing import Any
 
 from cdfctl.report.view.chart_html import ChartPanel
@@ -24,6 +25,9 @@ LOOKS = ("visual meshes", "collision geometry", "both")
 STEP = 0.01
 """Resolution of the time slider, s."""
 
+CHART_PERIOD = 0.1
+"""Between two drawings of the charts while the clock runs, s: they are far larger than a pose."""
+
 
 class Panel:
     """viser's controls for one replay."""
@@ -31,6 +35,7 @@ class Panel:
     def __init__(self, gui: Any, clock: Clock, stage: Stage, replay: Replay, title: str, facts: list[str]) -> None:
         """``gui`` is viser's interface to the controls; ``facts`` are lines shown under the title."""
         self._clock, self._stage, self._end = clock, stage, replay.duration
+        self._charts_at = -CHART_PERIOD
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="large", brand_color=(0, 114, 178))
         gui.set_panel_label("cdfctl view")
         gui.add_markdown("\n\n".join((f"**{_plain(title)}**", *(_plain(fact) for fact in facts))))
@@ -41,13 +46,13 @@ class Panel:
             speed = gui.add_dropdown("Speed", [f"{s:g}x" for s in SPEEDS], initial_value="1x")
             loop = gui.add_checkbox("Repeat", clock.loop, visible=not clock.following)
         self._loop = loop
+        self._status = gui.add_markdown("")
+        self._charts = gui.add_html("")
         with gui.add_folder("Show"):
             look = gui.add_dropdown("Robot", LOOKS, initial_value=LOOKS[0])
             for group, (label, hint) in SWITCHES.items():
                 if group in stage.groups:
                     self._switch(gui.add_checkbox(label, group not in HIDDEN, hint=hint), group)
-        self._status = gui.add_markdown("")
-        self._charts = gui.add_html("")
 
         self._slider.on_update(self._sought)
         self._play.on_click(lambda _: clock.toggle(self._end))
@@ -78,7 +83,9 @@ class Panel:
         self._slider.value = min(round(instant.t / STEP) * STEP, self._slider.max)
         self._play.label = "Pause" if self._clock.playing else "Play"
         self._status.content = _plain(status(instant, replay, following=self._clock.following))
-        self._charts.content = self._drawn.html(instant.t)
+        now = time.monotonic()
+        if now - self._charts_at >= CHART_PERIOD or not self._clock.playing:
+            self._charts.content, self._charts_at = self._drawn.html(instant.t), now
 
 
 def status(instant: Instant, replay: Replay, *, following: bool) -> str:

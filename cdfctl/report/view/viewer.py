@@ -21,7 +21,7 @@ POLL = 0.2
 """Between two looks at a run in progress, s."""
 
 
-PANEL_SHARE = 0.12
+PANEL_SHARE = 0.16
 """By how much of the picture's height the run is moved to the left, out of the panel's way."""
 
 
@@ -75,7 +75,6 @@ class Viewer:
     def run(self, stop: Callable[[], bool]) -> None:
         """Keep the page alive until ``stop`` says so; a KeyboardInterrupt passes through."""
         before = polled = time.monotonic()
-        shown = (self.clock.t, self.clock.playing)
         while not stop():
             time.sleep(PERIOD)
             now = time.monotonic()
@@ -83,8 +82,7 @@ class Viewer:
             polled = now if now - polled >= POLL else polled
             self.clock.tick(now - before, self.replay.duration)
             before = now
-            if grown or (self.clock.t, self.clock.playing) != shown:
-                shown = (self.clock.t, self.clock.playing)
+            if grown or (self.clock.t, self.clock.playing) != self._shown:
                 with self._server.atomic():
                     self._show()
 
@@ -102,6 +100,7 @@ class Viewer:
         return longer is not None or complete
 
     def _show(self) -> None:
-        instant = self.replay.at(self.clock.t)
+        self._shown = (self.clock.t, self.clock.playing)
+        instant = self.replay.at(self._shown[0])
         self.stage.show(instant, self.replay)
         self._panel.show(instant, self.replay)

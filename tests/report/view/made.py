@@ -12,6 +12,7 @@ from cdfctl.scenario.schema import Scenario
 from cdfctl.simulation.checks import robot_of
 from cdfctl.simulation.judge import judge
 from cdfctl.simulation.motion import SceneMotion
+from cdfctl.simulation.recorder import STATE_ARRAYS
 from cdfctl.simulation.result import RunResult
 from cdfctl.simulation.run_folder import write_run
 from cdfctl.types import Trajectory
@@ -65,6 +66,12 @@ def by_hand(scenario: Scenario, steps: int) -> Trajectory:
         plan_q=np.stack([q[:-1], q[:-1] + 0.1, np.full_like(q[:-1], np.nan)], axis=1),
         plan_t=np.tile([0.0, 0.1, np.nan], (steps, 1)),
     )
+
+
+def first_steps(run: Trajectory, steps: int) -> Trajectory:
+    """The first so many steps of ``run``."""
+    given = {name: value for name, value in vars(run).items() if value is not None}
+    return Trajectory(**{name: value[: steps + (name in STATE_ARRAYS)] for name, value in given.items()})
 
 
 def write_by_hand(folder: Path, steps: int) -> Path:

@@ -15,10 +15,8 @@ from cdfctl.report.view.replay import Replay
 from cdfctl.report.view.solids import collision_parts, visual_parts
 from cdfctl.report.view.stage import GROUPS, Stage, node_name
 from cdfctl.robots.robot import load_robot
-from cdfctl.simulation.recorder import STATE_ARRAYS
-from cdfctl.types import Trajectory
 
-from .made import by_hand
+from .made import by_hand, first_steps
 
 
 class Node:
@@ -160,20 +158,15 @@ def test_a_growing_run_is_drawn_as_it_comes(replay):
     scenario = replay.body.scenario
     whole = by_hand(scenario, 20)
     notes = Notes()
-    short = Replay(replay.body, _first(whole, 4))
+    short = Replay(replay.body, first_steps(whole, 4))
     stage = Stage(notes, short, complete=False)
     for steps in (4, 9, 20):
-        grown = Replay(replay.body, _first(whole, steps))
+        grown = Replay(replay.body, first_steps(whole, steps))
         stage.extend(grown, complete=steps == 20)
         stage.show(grown.at(9.0), grown)
     pieces = np.concatenate([notes.nodes[n].points for n in notes.below("trails") if "/tip/" in n])
     np.testing.assert_allclose(pieces[:, 0], replay.tip[:-1], atol=1e-6)
     np.testing.assert_allclose(pieces[:, 1], replay.tip[1:], atol=1e-6)
-
-
-def _first(run: Trajectory, steps: int) -> Trajectory:
-    given = {name: value for name, value in vars(run).items() if value is not None}
-    return Trajectory(**{name: value[: steps + (name in STATE_ARRAYS)] for name, value in given.items()})
 
 
 def test_the_camera_has_the_run_in_the_picture(staged, replay):
