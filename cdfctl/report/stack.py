@@ -38,7 +38,13 @@ NEEDED: Mapping[str, str] = {
 }
 """Every package cdfctl needs, and the module whose import shows that it works."""
 
-OPTIONAL: Mapping[str, str] = {"torch": "building contact tables", "matplotlib": "figures"}
+OPTIONAL: Mapping[str, str] = {
+    "torch": "building contact tables",
+    "matplotlib": "figures",
+    "viser": "the 3-D view",
+    "mujoco": "physics as a plant",
+    "franky-control": "a Franka as a plant",
+}
 """Packages of the extras, and what they add. Their import is slow, so only their presence is looked at."""
 
 

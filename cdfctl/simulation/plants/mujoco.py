@@ -118,6 +118,7 @@ class MujocoPlant(Plant):
         contact = self._contact
         return {
             "type": "mujoco",
+            "version": str(self._mujoco.__version__),
             "timestep_s": self._config.timestep,
             "servo_gain": float(self._built.gains.max()),
             **_errors("velocity_error", "rad_s", self._velocity_errors),
