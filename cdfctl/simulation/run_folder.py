@@ -146,6 +146,26 @@ def read_run(folder: Path) -> Run:
     return Run(folder, scenario, document, _trajectory(arrays, path))
 
 
+def check_fits(run: Run, robot: str, n: int, m: int) -> None:
+    """Refuse a run whose arrays are not of ``robot`` with its ``n`` joints among ``m`` obstacles, or not of numbers.
+
+    Raises:
+        InputError: in one line, with the file.
+    """
+    path, arrays = run.path / TRAJECTORY, run.trajectory
+    if arrays.q.shape[1] != n:
+        raise InputError(
+            f"{path}: is of {arrays.q.shape[1]} joints, but the scenario's robot '{robot}' has {n}",
+            hint="run the scenario again",
+        )
+    if arrays.h.shape[1] != m:
+        raise InputError(
+            f"{path}: is of {arrays.h.shape[1]} obstacles, but the scenario has {m}", hint="run the scenario again"
+        )
+    if not all(np.isfinite(array).all() for array in (arrays.t, arrays.q, arrays.obstacle_pose)):
+        raise InputError(f"{path}: damaged: a time, a configuration or a pose is not finite", "run the scenario again")
+
+
 def _document(folder: Path) -> dict[str, Any]:
     path = folder / RESULT
     try:

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from cdfctl.robots.robot import frame_index
-from cdfctl.scenario.schema import JointGoalTask, ReachTask, Scenario
+from cdfctl.scenario.schema import HoldTask, JointGoalTask, ReachTask, Scenario
 from cdfctl.simulation.checks import robot_of
 from cdfctl.simulation.clearance import Clearance, Closest
 from cdfctl.simulation.motion import SceneMotion
-from cdfctl.simulation.run_folder import Run
+from cdfctl.simulation.run_folder import Run, check_fits
 from cdfctl.simulation.shapes import vector_of
 from cdfctl.types import Array, Shape, Trajectory
 
@@ -56,9 +56,9 @@ class Body:
     Attributes:
         scenario: as resolved.
         robot: the robot.
-        shapes, names: of the m obstacles.
+        shapes, names: of the m obstacles; one without a name is ``obstacle`` and its number, from 1.
         target: shape of a reach task's target, None for another task.
-        goal: (n,) configuration of a joint goal, None for another task.
+        goal: (n,) configuration to be at, None for a reach task.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -67,10 +67,11 @@ class Body:
 
         self.scenario, self.robot = scenario, robot_of(scenario.robot)
         motion = SceneMotion(scenario.obstacles)
-        self.shapes, self.names = motion.shapes, motion.names
+        self.shapes = motion.shapes
+        self.names = tuple(f"obstacle {int(name) + 1}" if name.isdecimal() else name for name in motion.names)
         self._target = SceneMotion((scenario.task.target,)) if isinstance(scenario.task, ReachTask) else None
         self.target: Shape | None = None if self._target is None else self._target.shapes[0]
-        self.goal = vector_of(scenario.task.goal) if isinstance(scenario.task, JointGoalTask) else None
+        self.goal = _goal(scenario)
         self.clearance = Clearance(self.robot, self.shapes)
         self._pin, self._data = pin, self.robot.model.createData()
         self._tip = frame_index(self.robot.model, self.robot.tip)
@@ -92,6 +93,16 @@ class Body:
         return np.array([*origins, self._data.oMf[self._tip].translation])
 
 
+def _goal(scenario: Scenario) -> Array | None:
+    match scenario.task:
+        case JointGoalTask(goal=goal):
+            return vector_of(goal)
+        case HoldTask(pose=pose):
+            return vector_of(pose)
+        case _:
+            return None
+
+
 class Replay:
     """A body and the arrays of its run.
 
@@ -107,13 +118,18 @@ class Replay:
         self.path_t, self.path_q = trajectory.path
         self.duration = float(trajectory.t[-1])
         self.tip = body.robot.tip_path(self.path_q)
-        # Of a predictive controller: (N, K, n) configurations planned at each step, NaN where there was no plan.
-        self.plan_q: Array | None = getattr(trajectory, "plan_q", None)
+        self.plan_q = trajectory.plan_q
 
     @classmethod
     def of(cls, run: Run) -> Replay:
-        """The replay of a run folder."""
-        return cls(Body(run.scenario), run.trajectory)
+        """The replay of a run folder.
+
+        Raises:
+            InputError: its arrays are not of its scenario, or the robot or a shape's file is not there any more.
+        """
+        body = Body(run.scenario)
+        check_fits(run, body.robot.name, body.robot.n, len(body.shapes))
+        return cls(body, run.trajectory)
 
     @property
     def steps(self) -> int:

@@ -9,8 +9,10 @@ import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
+from cdfctl.errors import InputError
 from cdfctl.report.view.replay import Replay, slerp
 from cdfctl.simulation.clearance import nearest
+from cdfctl.simulation.run_folder import read_run
 from cdfctl.types import Box, Scene, Sphere
 
 from .made import INFEASIBLE
@@ -101,3 +103,17 @@ def test_a_run_without_steps_stands_still(replay):
     np.testing.assert_allclose(instant.q, run.q[0])
     assert (instant.t, instant.contact_q, instant.plan, instant.infeasible) == (0.0, None, None, False)
     assert instant.closest is not None
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"q": np.zeros((21, 6))}, "is of 6 joints, but the scenario's robot 'franka' has 7"),
+        ({"h": np.zeros((20, 3))}, "is of 3 obstacles, but the scenario has 2"),
+        ({"t": np.full(21, np.nan)}, "not finite"),
+    ],
+)
+def test_arrays_of_another_run_are_refused(run_folder, change, words):
+    run = read_run(run_folder)
+    with pytest.raises(InputError, match=words):
+        Replay.of(replace(run, trajectory=replace(run.trajectory, **change)))
