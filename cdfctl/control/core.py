@@ -85,10 +85,11 @@ class Core:
     def follow(self, q: Array, scene: Scene, u: Array) -> Decision:
         """``u`` (n,) as the command, no row of an obstacle asked; what is reported is that of :meth:`step`.
 
-        Only what a plan knows nothing of may change it: acceleration limits and the robot's own links.
+        Only what a plan knows nothing of may change it: acceleration limits, velocity limits that fall towards the end
+        stops, and the robot's own links.
         """
         h = least_barrier(self._sources[0].ask(q, scene), len(scene), self.parameters.margin)
-        if self._accelerates_freely and self._own is None:
+        if self._accelerates_freely and self.robot.braking is None and self._own is None:
             self.u_last = u.copy()
             return Decision(u=u, h=h, slack=float("nan"), status="optimal", infeasible=False, residual=0.0)
         return self._decide(q, scene, u, h, [], [])

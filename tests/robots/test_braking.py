@@ -10,6 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cdfctl.control.core import Core
+from cdfctl.control.parameters import config_of, resolved
 from cdfctl.control.safety_filter import SafetyFilter
 from cdfctl.errors import InputError
 from cdfctl.robots.braking import Braking
@@ -73,6 +75,18 @@ def test_the_filter_keeps_to_it():
         assert u[1] <= min(v, max(0.0, -o + math.sqrt(a2 * max(0.0, top - q[1])))) + 1e-6
     assert fastest == pytest.approx(2.62)
     assert 1.80 < q[1] < 1.8361
+
+
+def test_a_plan_keeps_to_it_too():
+    """A command that is followed as it is, but for what its plan does not know."""
+    robot = load_robot("fr3")
+    core = Core(robot, *resolved(config_of("sdf-tvcbf-qp", {})), 0.1)
+    q, u = robot.home.copy(), np.zeros(7)
+    q[1], u[1] = 1.6, 2.62
+    followed = core.follow(q, Scene([]), u)
+    assert followed.u[1] <= robot.velocity_bounds(q, 0.1)[1][1] + 1e-9
+    q[1] = 0.0
+    assert core.follow(q, Scene([]), u).u == pytest.approx(u, abs=1e-6)
 
 
 @pytest.mark.parametrize(
