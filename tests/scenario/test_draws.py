@@ -86,7 +86,11 @@ def test_what_still_holds_draws_says_so():
 
 reals = st.floats(allow_nan=False, allow_infinity=False)
 ends = st.floats(-1e6, 1e6)
-numbers = reals | st.tuples(ends, ends).map(lambda ab: {"uniform": sorted(ab)})
+numbers = (
+    reals
+    | st.tuples(ends, ends).map(lambda ab: {"uniform": sorted(ab)})
+    | st.tuples(ends, ends).map(lambda ab: {"uniform": sorted(map(abs, ab)), "mirrored": True})
+)
 positives = st.floats(min_value=0, exclude_min=True, allow_infinity=False)
 three = st.lists(numbers, min_size=3, max_size=3)
 texts = st.text(st.characters(exclude_categories=["C", "Z"]) | st.just(" "), max_size=30) | st.sampled_from(
@@ -189,6 +193,6 @@ def test_draws_stay_within_bounds(scenario, seed, trial):
     assert drawn == draw(scenario, seed, trial)
     for before, after in zip(scenario.robot.q0, drawn.robot.q0, strict=True):
         if isinstance(before, Uniform):
-            assert before.uniform[0] <= after <= before.uniform[1]
+            assert before.uniform[0] <= (abs(after) if before.mirrored else after) <= before.uniform[1]
         else:
             assert before == after
