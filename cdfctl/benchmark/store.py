@@ -171,9 +171,7 @@ def _manifest(plan: Plan, keys: int) -> dict[str, Any]:
         "suite": plan.suite,
         "trials": keys // len(plan.cells),
         "configuration": plan.configuration(),
-        "cells": [
-            {"sweep": {s.field: s.text for s in cell.settings}, "shipped": cell.shipped} for cell in plan.cells
-        ],
+        "cells": [{"sweep": {s.field: s.text for s in cell.settings}, "shipped": cell.shipped} for cell in plan.cells],
         "versions": versions(),
     }
 
