@@ -232,7 +232,7 @@ class ControllerConfig(Strict):
     ] = None
     solver: Annotated[Label | None, about("QP solver, any installed one of qpsolvers")] = None
     segments: Annotated[
-        int | None, BeforeValidator(Whole(1, 8)), about("plans: straight motions before the one to the goal")
+        int | None, BeforeValidator(Whole(1, 64)), about("plans: straight motions before the one to the goal")
     ] = None
     horizon: Annotated[PlainPositive | None, about("plans: the longest those motions take together", "s")] = None
     candidates: Annotated[

@@ -178,8 +178,8 @@ VARIANTS: Mapping[str, Variant] = MappingProxyType(
                     {
                         "alpha": Default(3.0, "ours"),
                         "margin": Default(0.03, "ours: 0.01 loses 0.07 of the successes on X2"),
-                        "segments": Default(4, "ours"),
-                        "horizon": Default(3.0, "ours: 1 s loses a fifth of the successes on X2"),
+                        "segments": Default(16, "ours"),
+                        "horizon": Default(8.0, "ours: 3 s leave some of X2 unsolved"),
                         "candidates": Default(256, "ours"),
                         "planner_seed": Default(0, "ours"),
                         "prediction": Default("constant-twist", "ours"),

@@ -16,7 +16,7 @@ from cdfctl.robots.convex import ConvexPiece, convex_hull
 from cdfctl.robots.robot import Robot
 from cdfctl.types import Array, BoolArray, IntArray
 
-COVER = 8  # balls that cover a piece
+COVER = 16  # balls that cover a piece
 TURNS = 400  # steps of the search for the smallest ball around some points; its error falls as 1 / TURNS
 
 

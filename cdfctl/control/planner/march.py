@@ -28,6 +28,8 @@ from cdfctl.types import Array
 STEP = 0.01  # m: how far a distance may fall below the margin unseen, if that is not more than half the margin
 LEAST_STEP = 1e-4  # m: but never less than this, or no motion would end
 SHORT = 0.06  # s: a bound that allows a longer advance is not made tighter
+SHORTER = 0.012  # s: nor is the exact distance computed where the cover allows this and ``ROOM``
+ROOM = 0.01  # m
 LONG = 0.25  # s: no advance is longer; bounds on speed hold that long
 
 
@@ -138,11 +140,26 @@ def march(
     less the widening of the margin.
     """
     t, least, looks = start, near, 0
+    # The whole robot as one ball about its first piece, and a bound on its speed that holds however far it moves.
+    fastest, price = 0.0, 8 * u.shape[0] + 2 * arm.radius.shape[0]
+    for k in range(arm.radius.shape[0]):
+        speed = 0.0
+        for j in range(u.shape[0]):
+            speed += abs(u[j]) * arm.reach[j, k]
+        fastest = max(fastest, speed)
     piece, until, line = space.piece, space.until, course.line
     for i in range(until.shape[0]):
         until[i] = start
+    place(arm, q, u, 0.0, space)
+    still = True
+    for j in range(u.shape[0]):
+        still = still and u[j] == 0.0
     while True:
-        place(arm, q, u, t - start, space)
+        whole = 0.0
+        for k in range(piece.shape[0]):
+            dx, dy, dz = piece[k, 0] - piece[0, 0], piece[k, 1] - piece[0, 1], piece[k, 2] - piece[0, 2]
+            whole = max(whole, sqrt(dx * dx + dy * dy + dz * dz) + piece[k, 3])
+        looks += price
         soon = inf
         for i in range(until.shape[0]):
             if until[i] > t:
@@ -160,6 +177,14 @@ def march(
             widened = margin - course.margin[o, 0]
             ball, pace_i = course.block[i, 3], course.pace[i]
             ahead = LONG
+            if piece.shape[0] > 0:
+                dx, dy, dz = x - piece[0, 0], y - piece[0, 1], z - piece[0, 2]
+                gap = sqrt(dx * dx + dy * dy + dz * dz) - whole - ball - margin
+                looks += 1
+                if gap >= near and gap >= LONG * (fastest + pace_i):
+                    until[i] = t + gap / (fastest + pace_i) if fastest + pace_i > 0.0 else inf
+                    soon = min(soon, until[i])
+                    continue
             for k in range(piece.shape[0]):
                 pace = piece[k, 4] + pace_i
                 need = margin + pace * min(ahead, SHORT)
@@ -195,9 +220,10 @@ def march(
                             dx, dy, dz = c[0] - arm.ball[n, 0], c[1] - arm.ball[n, 1], c[2] - arm.ball[n, 2]
                             d = min(d, sqrt(dx * dx + dy * dy + dz * dz) - arm.ball[n, 3])
                         d -= ball
-                    if d < need or not course.point[i]:
+                    exact_below = margin + ROOM + pace * SHORTER
+                    if d < exact_below or not course.point[i]:
                         looks += 20
-                        d = nearer(arm, course, i, k, t, need, want, space)
+                        d = nearer(arm, course, i, k, t, exact_below, space)
                 if d < margin:
                     space.looks[0] += looks
                     return t, min(least, d - widened)
@@ -210,12 +236,13 @@ def march(
             space.looks[0] += looks
             return inf, least
         t = soon
+        if not still:
+            place(arm, q, u, t - start, space)
 
 
 @njit
-def nearer(arm: Arm, course: Course, i: int, k: int, t: float, need: float, want: float, space: Space) -> float:
-    """A lower bound of the distance of piece k as placed to block i at time t: exact where it is below ``need``, by
-    the cover where it is below ``want``."""
+def nearer(arm: Arm, course: Course, i: int, k: int, t: float, need: float, space: Space) -> float:
+    """A lower bound of the distance of piece k as placed to block i at time t: exact where it is below ``need``."""
     r, p = pose_at(course.knot, course.rotation, course.position, course.twist, course.obstacle[i], t)
     joint = arm.body.joint[k]
     joint_r, joint_p = rot(space.rotation, joint), vec(space.origin, joint)

@@ -11,12 +11,15 @@ import numpy as np
 from cdfctl.control.planner.arm import arm_of
 from cdfctl.control.planner.course import Course
 from cdfctl.control.planner.march import Space, new_space
+from cdfctl.control.planner.plan import Aim, new_plan, shift
 from cdfctl.control.planner.random import new_stream
-from cdfctl.control.planner.search import Aim, new_plan, search, shift
+from cdfctl.control.planner.search import BOOST, search
+from cdfctl.control.planner.tree import new_tree
 from cdfctl.robots.robot import Robot
 from cdfctl.types import Array
 
-SLICE = 20_000.0  # distances evaluated between two looks at the clock, about 0.5 ms
+SLICE = 5_000.0  # work between two looks at the clock, about 0.1 ms
+WORK = 60.0  # a step's work, for each candidate and joint: where trying is dear, fewer are tried
 
 
 @dataclass(frozen=True)
@@ -62,8 +65,8 @@ class Planner:
         self.robot, self._settings, self._dt = robot, settings, dt
         self._arm = arm_of(robot)
         self._turn = np.where(robot.continuous, 2.0 * np.pi, 0.0)
-        self._best, self._trial = (new_plan(settings.segments, robot.n) for _ in range(2))
-        self._where, self._still = np.zeros(robot.n), np.zeros(robot.n)
+        self._best = new_plan(settings.segments, robot.n)
+        self._tree = new_tree(2 * BOOST * settings.candidates + settings.segments, settings.segments, robot.n)
         self._space: Space = new_space(self._arm, 0)
         self.reset()
 
@@ -96,24 +99,26 @@ class Planner:
             horizon=settings.horizon,
         )
         shift(self._best, self._dt)
-        began, first, last = time.perf_counter(), 0, settings.candidates
+        began, first, work = time.perf_counter(), 0, 0.0
         slice_began = began
-        while first < last:
+        # As for the candidates, there is more work to be done while no plan is free.
+        while first < BOOST * settings.candidates and work < settings.candidates * robot.n * WORK * (
+            1 if self._best.value[1] == inf and first > 0 else BOOST
+        ):
             first = search(
                 self._arm,
                 course,
                 aim,
                 self._best,
-                self._trial,
+                self._tree,
                 q,
                 first,
-                last,
+                settings.candidates,
                 SLICE,
                 self._stream,
-                self._where,
-                self._still,
                 self._space,
             )
+            work += float(self._space.looks[0])
             now = time.perf_counter()
             if now - began + (now - slice_began) > settings.budget:
                 break  # another slice may not fit

@@ -1,192 +1,37 @@
-"""The search: plans are made at random around the best so far, scored, and the best is kept."""
+"""The search: a tree of motions that keep their margins is grown at random; from its nodes the straight way is tried.
+
+An edge is one straight joint motion, marched once, so that plans with the same beginning share its price. The tree
+begins with the best plan of the last step. Once a plan is free, nothing is marched that cannot become better: the time
+of a node and the straight way from there bound the cost of every plan through it.
+"""
 
 from __future__ import annotations
 
-from math import exp, inf
-from typing import NamedTuple
-
-import numpy as np
+from math import inf
 
 from cdfctl.control.planner.arm import Arm
 from cdfctl.control.planner.course import Course
 from cdfctl.control.planner.jit import njit
 from cdfctl.control.planner.march import Space, march
-from cdfctl.control.planner.random import Stream, normal, uniform
+from cdfctl.control.planner.plan import CLEAR, Aim, Plan, bound_motion, free_cost, hit_cost, straight
+from cdfctl.control.planner.random import Stream, uniform
+from cdfctl.control.planner.tree import (
+    Tree,
+    add_node,
+    keep,
+    plant,
+    propose_change,
+    propose_random,
+    propose_toward,
+)
 from cdfctl.types import Array
 
-HIT = 1000.0
-CLEAR = 0.15
-WEIGHT = 3.0
-HOLD = 1.0
-SHARE = 0.4
-
-
-class Aim(NamedTuple):
-    goal: Array
-    turn: Array  # (n,) 2 pi for continuous
-    speed: Array
-    low: Array
-    high: Array
-    limit: Array
-    stay: float
-    horizon: float
-
-
-class Plan(NamedTuple):
-    u: Array  # (S+1, n) the last is the tail
-    tau: Array  # (S+1,)
-    value: Array  # (4,) J, hit time, t_end, min d
-
-
-def new_plan(segments: int, n: int) -> Plan:
-    return Plan(np.zeros((segments + 1, n)), np.zeros(segments + 1), np.array([np.inf, 0.0, 0.0, 0.0]))
-
-
-@njit
-def copy_plan(a: Plan, b: Plan) -> None:
-    for s in range(a.tau.shape[0]):
-        b.tau[s] = a.tau[s]
-        for j in range(a.u.shape[1]):
-            b.u[s, j] = a.u[s, j]
-    for i in range(4):
-        b.value[i] = a.value[i]
-
-
-@njit
-def shape_plan(aim: Aim, plan: Plan, q: Array, w: Array) -> float:
-    """Clip to limits, fill the tail; returns t_end."""
-    S, n = plan.u.shape
-    S -= 1
-    t = 0.0
-    for j in range(n):
-        w[j] = q[j]
-    for s in range(S):
-        tau = plan.tau[s]
-        if tau <= 0.0:
-            plan.tau[s] = 0.0
-            continue
-        for j in range(n):
-            u = min(aim.limit[j], max(-aim.limit[j], plan.u[s, j]))
-            x = w[j] + u * tau
-            if x > aim.high[j]:
-                u = max(0.0, aim.high[j] - w[j]) / tau
-            elif x < aim.low[j]:
-                u = min(0.0, aim.low[j] - w[j]) / tau
-            plan.u[s, j] = u
-            w[j] += u * tau
-        t += tau
-    tail = 0.0
-    for j in range(n):
-        d = aim.goal[j] - w[j]
-        if aim.turn[j] > 0.0:
-            d -= aim.turn[j] * np.floor(d / aim.turn[j] + 0.5)
-        plan.u[S, j] = d
-        tail = max(tail, abs(d) / aim.speed[j])
-    plan.tau[S] = tail
-    for j in range(n):
-        plan.u[S, j] = plan.u[S, j] / tail if tail > 0.0 else 0.0
-    return t + tail
-
-
-@njit
-def score(
-    arm: Arm, course: Course, aim: Aim, plan: Plan, q: Array, bound: float, w: Array, rest: Array, space: Space
-) -> float:
-    t_end = shape_plan(aim, plan, q, w)
-    plan.value[2] = t_end
-    plan.value[0] = inf
-    if t_end >= bound:
-        return inf
-    S, n = plan.u.shape
-    for j in range(n):
-        w[j] = q[j]
-    t, least = 0.0, CLEAR
-    for s in range(S):
-        tau = plan.tau[s]
-        if tau <= 0.0:
-            continue
-        hit, d = march(arm, course, w, plan.u[s], t, t + tau, CLEAR, space)
-        least = min(least, d)
-        if hit < inf:
-            plan.value[0], plan.value[1], plan.value[3] = HIT - 100.0 * hit - 10.0 * least, hit, least
-            return plan.value[0]
-        for j in range(n):
-            w[j] += plan.u[s, j] * tau
-        t += tau
-        if t_end + WEIGHT * (CLEAR - least) >= bound:
-            return inf
-    J = t_end + WEIGHT * (CLEAR - least)
-    hit_time = inf
-    stay = min(aim.stay, max(t_end, aim.horizon)) - t
-    if stay > 0.0:
-        hit, d = march(arm, course, w, rest, t, t + stay, CLEAR, space)
-        if hit < inf:
-            J, hit_time = HIT - 100.0 * hit - 10.0 * d, hit
-    elif True:
-        hit, d = march(arm, course, w, rest, t, t + HOLD, CLEAR, space)
-        if hit < inf:
-            J += 0.5 * (1.0 - (hit - t) / HOLD)
-    plan.value[0], plan.value[1], plan.value[3] = J, hit_time, least
-    return J
-
-
-@njit
-def vary(aim: Aim, best: Plan, plan: Plan, stream: Stream) -> None:
-    S = plan.tau.shape[0] - 1
-    n = plan.u.shape[1]
-    for s in range(S):
-        plan.tau[s] = best.tau[s]
-        for j in range(n):
-            plan.u[s, j] = best.u[s, j]
-    size = 0.02 + 0.6 * uniform(stream) ** 2
-    one = int(uniform(stream) * S) if uniform(stream) < 0.5 else -1
-    for s in range(S):
-        if one >= 0 and s != one:
-            continue
-        if plan.tau[s] <= 0.0:
-            if uniform(stream) < 0.5:
-                plan.tau[s] = 0.5 * uniform(stream)
-                for j in range(n):
-                    plan.u[s, j] = aim.limit[j] * (2.0 * uniform(stream) - 1.0)
-            continue
-        plan.tau[s] *= exp(size * normal(stream))
-        for j in range(n):
-            plan.u[s, j] += size * aim.limit[j] * normal(stream)
-
-
-@njit
-def fresh(aim: Aim, plan: Plan, stream: Stream) -> None:
-    S = plan.tau.shape[0] - 1
-    n = plan.u.shape[1]
-    count = 1 + int(uniform(stream) * S)
-    left = aim.horizon * uniform(stream)
-    total = 0.0
-    for s in range(S):
-        plan.tau[s] = uniform(stream) if s < count else 0.0
-        total += plan.tau[s]
-        kind = uniform(stream)
-        for j in range(n):
-            x = uniform(stream)
-            if kind < 0.4:
-                v = 1.0 if x < 0.5 else -1.0
-            elif kind < 0.6:
-                v = 1.0 if x < 1.0 / 3.0 else (-1.0 if x > 2.0 / 3.0 else 0.0)
-            elif kind < 0.7:
-                v = 0.0
-            else:
-                v = 2.0 * x - 1.0
-            plan.u[s, j] = v * aim.limit[j]
-    for s in range(S):
-        plan.tau[s] *= left / total
-
-
-@njit
-def shift(plan: Plan, dt: float) -> None:
-    """Drop the first dt."""
-    for s in range(plan.tau.shape[0]):
-        used = min(dt, plan.tau[s])
-        plan.tau[s] -= used
-        dt -= used
+CHANGE = 0.25  # share of candidates that vary the best plan, once it is free
+TOWARD = 0.7  # share of the others that go toward a random configuration and time
+BOOST = 4  # times as many candidates while no plan is free
+GOOD = 1e-3  # s: nothing is sought that is better by less
+REST = 1.0  # s: how long the goal should stay free after arrival, where the task does not say
+BACK = 0.02  # s: a motion that breaks a margin is kept until this long before
 
 
 @njit
@@ -195,31 +40,115 @@ def search(
     course: Course,
     aim: Aim,
     best: Plan,
-    trial: Plan,
+    tree: Tree,
     q: Array,
     first: int,
-    last: int,
+    candidates: int,
     effort: float,
     stream: Stream,
-    w: Array,
-    rest: Array,
     space: Space,
 ) -> int:
+    """Try candidates from number ``first`` on, until there are enough or ``effort`` distances have been evaluated.
+
+    Candidate 0 is the plan of the last step, in ``best``; candidate 1 is the straight way. Returns the number to go on
+    with; ``BOOST * candidates`` means that all is done.
+    """
     space.looks[0] = 0.0
-    S = trial.tau.shape[0] - 1
-    for c in range(first, last):
-        if c == 0:
-            score(arm, course, aim, best, q, inf, w, rest, space)
-        else:
-            if c == 1:
-                for s in range(S):
-                    trial.tau[s] = 0.0
-            elif best.value[0] < inf and uniform(stream) < SHARE:
-                vary(aim, best, trial, stream)
-            else:
-                fresh(aim, trial, stream)
-            if score(arm, course, aim, trial, q, best.value[0], w, rest, space) < best.value[0]:
-                copy_plan(trial, best)
+    n, enough = q.shape[0], BOOST * candidates
+    least_cost = straight(aim, q, tree.work) + GOOD
+    for c in range(first, enough):
+        free = c > 1 and best.value[1] == inf
+        if free and (c >= candidates or best.value[0] <= least_cost):
+            return enough
         if space.looks[0] >= effort:
-            return c + 1
-    return last
+            return c
+        node, count = 0, 0
+        if c == 0:
+            plant(tree, q)
+            while count < tree.tau.shape[0] and best.tau[count] > 0.0:
+                tree.tau[count] = best.tau[count]
+                for j in range(n):
+                    tree.move[count, j] = best.u[count, j]
+                count += 1
+            best.value[0], best.value[1] = inf, 0.0
+        elif c > 1:
+            if free and uniform(stream) < CHANGE:
+                count = propose_change(aim, best, tree, stream)
+            else:
+                count = 1
+                if uniform(stream) < TOWARD:
+                    node = propose_toward(aim, best, tree, stream)
+                else:
+                    node = propose_random(aim, tree, stream)
+            if count == 0 or node < 0:
+                continue
+        _follow(arm, course, aim, best, tree, node, count, space)
+    return enough
+
+
+@njit
+def _follow(arm: Arm, course: Course, aim: Aim, best: Plan, tree: Tree, node: int, count: int, space: Space) -> None:
+    """Try ``count`` motions from ``node``, then the straight way, then rest: new nodes, and perhaps a better plan.
+
+    All is one loop about one call of the march: each call more would cost the compiler as long again.
+    """
+    n, way = tree.work.shape[0], tree.move.shape[0] - 2
+    arrival, must, cost, passed = 0.0, 0.0, 0.0, CLEAR
+    for i in range(count + 2):
+        free = best.value[1] == inf
+        start, least = tree.at[node, 0], tree.at[node, 2]
+        if i < count:
+            u, tau = tree.move[i], tree.tau[i]
+            if tau <= 0.0:
+                return
+            bound_motion(aim, tree.q[node], u, tau)
+            for j in range(n):
+                tree.work[j] = tree.q[node, j] + tau * u[j]
+            ahead = straight(aim, tree.work, tree.move[way])
+            if free and free_cost(start + tau + ahead, least) >= best.value[0] - GOOD:
+                return
+            for j in range(n):
+                tree.work[j] = tree.q[node, j]
+        elif i == count:
+            u = tree.move[way]
+            tau = straight(aim, tree.q[node], u)
+            if free and free_cost(start + tau, least) >= best.value[0]:
+                return
+            for j in range(n):
+                tree.work[j] = tree.q[node, j]
+            arrival = start + tau
+        else:
+            u = tree.move[way + 1]
+            must = min(aim.stay, max(arrival, aim.horizon)) - arrival
+            for j in range(n):
+                tree.work[j] = tree.q[node, j] + tree.move[way, j] * (arrival - start)
+                u[j] = 0.0
+            start, tau = arrival, max(must, REST)
+        hit, d = march(arm, course, tree.work, u, start, start + tau, CLEAR, space)
+        least = min(least, d)
+        if i < count:
+            if hit < inf:
+                if not free and hit_cost(hit, least) < best.value[0]:
+                    keep(best, tree, node, u, hit - start, hit_cost(hit, least), hit, least)
+                if hit - start > 2.0 * BACK:
+                    add_node(tree, node, u, hit - start - BACK, tree.at[node, 2])
+                return
+            node = add_node(tree, node, u, tau, least)
+            if node < 0:
+                return
+        elif i == count:
+            cost, passed = free_cost(arrival, least), least
+            if hit < inf:
+                if not free and hit_cost(hit, least) < best.value[0]:
+                    keep(best, tree, node, u, tau, hit_cost(hit, least), hit, least)
+                return
+            if cost >= best.value[0]:
+                return
+        else:
+            stop = inf
+            if hit < arrival + must:
+                cost, stop = hit_cost(hit, passed), hit
+            elif hit < inf:
+                cost += 0.5 * (1.0 - (hit - arrival) / REST)
+            if cost < best.value[0] and (stop == inf or not free):
+                keep(best, tree, node, tree.move[way], arrival - tree.at[node, 0], cost, stop, passed)
