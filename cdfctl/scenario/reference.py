@@ -115,8 +115,8 @@ def _kind(schema: dict[str, Any], info: dict[str, Any]) -> str:
         return "draw" if "uniform" in info.get("properties", {}) else "mapping by name"
     if info.get("type") == "array":
         return _list_kind(schema, info)
-    kinds = {"string": "text", "integer": "whole number", "number": "number", "boolean": "true or false"}
-    return kinds.get(info.get("type", ""), "value")
+    names = {"string": "text", "integer": "whole number", "number": "number", "boolean": "true or false"}
+    return names.get(info.get("type", ""), "value")
 
 
 def _list_kind(schema: dict[str, Any], info: dict[str, Any]) -> str:
