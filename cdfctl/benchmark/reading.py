@@ -37,11 +37,6 @@ class StoredBench:
     cells: tuple[CellTrials, ...]
 
 
-def is_store(folder: Path) -> bool:
-    """Whether ``folder`` looks like a benchmark's store."""
-    return (folder / MANIFEST).is_file()
-
-
 def read_store(folder: Path) -> StoredBench:
     """The benchmark in ``folder``.
 

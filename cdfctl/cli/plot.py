@@ -98,6 +98,7 @@ def plot(
             show_default=False,
         ),
     ] = None,
+    dpi: Annotated[int, typer.Option("--dpi", min=50, max=600, help="Of a PNG, dots an inch.")] = 200,
     json: options.Json = False,
     quiet: options.Quiet = False,
     debug: options.Debug = False,
@@ -123,7 +124,7 @@ def plot(
         parts = paper_parts(names) if source is None else source_parts(source, names, fields, at or ())
         folder = Path() if source is None else source / FOLDER
         sheet = names == [OVERVIEW]
-        written = _write(parts, out or folder, layout, width, sheet=sheet)
+        written = _write(parts, out or folder, layout, width, dpi, sheet=sheet)
     if json:
         files = [{"figure": name, "file": str(path)} for name, path in written]
         write_json({"source": None if source is None else str(source), "figures": files})
@@ -148,7 +149,7 @@ def _check_out(out: Path | None, layout: Format | None) -> None:
 
 
 def _write(
-    parts: list[Part], target: Path, layout: Format | None, width: float | None, *, sheet: bool
+    parts: list[Part], target: Path, layout: Format | None, width: float | None, dpi: int, *, sheet: bool
 ) -> list[tuple[str, Path]]:
     """One sheet into a file, or a file each into a folder; a path with a suffix is a file."""
     from cdfctl.report.figures.output import save_figure
@@ -162,7 +163,7 @@ def _write(
         single = [(part.name, target / f"{part.name}{suffix}", [part]) for part in parts]
         planned = [(OVERVIEW, target / f"{OVERVIEW}{suffix}", parts)] if sheet else single
     for _, path, together in planned:
-        save_figure(figure_of(together, width), path)
+        save_figure(figure_of(together, width), path, dpi)
     return [(name, path) for name, path, _ in planned]
 
 

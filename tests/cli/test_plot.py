@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from cdfctl.report.figures import animation, catalogue, joint_space, levels
+from cdfctl.report.figures import animation, joint_space, levels
 
 from .helpers import files_below
 
@@ -15,7 +15,7 @@ from .helpers import files_below
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch):
     """The same figures on a coarse grid."""
-    monkeypatch.setitem(catalogue.PAPER, "levels", lambda: levels.levels(points=9))
+    monkeypatch.setattr(levels, "POINTS", 9)
     monkeypatch.setattr(joint_space, "POINTS", (9, 9))
     monkeypatch.setattr(animation, "POINTS", 9)
     monkeypatch.setattr(animation, "HOLD", 0.1)

@@ -12,9 +12,10 @@ import numpy as np
 
 from cdfctl.report.figures.field_map import both_maps, draw_map, draw_region, joint_axes, level_steps
 from cdfctl.report.figures.joint_space import axis_values
+from cdfctl.report.figures.made_run import made_run
 from cdfctl.report.figures.outline import Skeleton
 from cdfctl.report.figures.part import Part
-from cdfctl.report.figures.run_view import RunView, made_run
+from cdfctl.report.figures.run_view import RunView
 from cdfctl.report.figures.style import BLACK, BLUE, COLUMN, GREEN, PURPLE, VERMILION, grid, mixed
 from cdfctl.report.figures.task_space import dense
 from cdfctl.scenario.overrides import Override, parse_override
@@ -80,7 +81,7 @@ def _joints(canvas: Canvas, axes: Axes, views: list[RunView], name: str, points:
         edge = _edge()
         axes.plot(
             *view.trajectory.q.T, color=colour, linestyle=style, linewidth=1.5, path_effects=edge, zorder=4,
-            marker=marker, markersize=2.8, markevery=10, markeredgecolor="white", markeredgewidth=0.4,
+            marker=marker, markersize=3.6, markevery=10, markeredgecolor=BLACK, markeredgewidth=0.5,
         )  # fmt: skip
     start, goal = views[0].trajectory.q[0], views[0].goal
     axes.plot(*start, marker="o", markerfacecolor="white", markeredgecolor=BLACK, markersize=5, zorder=5)

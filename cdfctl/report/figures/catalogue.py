@@ -1,25 +1,20 @@
-"""Which figures there are: of a run, of a benchmark, and of the paper."""
+"""Which figures there are: of a run, of a benchmark, and of the paper.
+
+What a figure needs is imported when it is asked for: a run's figures are there before the solvers would be loaded.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
-from cdfctl.benchmark.reading import is_store, read_store
 from cdfctl.errors import InputError, unknown_name
-from cdfctl.report.figures.avoidance import avoidance
-from cdfctl.report.figures.bench_panels import bench_parts
-from cdfctl.report.figures.joint_space import default_instants, joint_space
-from cdfctl.report.figures.levels import levels
 from cdfctl.report.figures.part import OVERVIEW, Part
-from cdfctl.report.figures.reaching import reaching
-from cdfctl.report.figures.run_view import view_run
-from cdfctl.report.figures.sweep import sweep_part, swept
-from cdfctl.report.figures.task_space import task_space
-from cdfctl.report.figures.time_course import time_course
 
-PAPER = {"levels": levels, "avoidance": avoidance, "reaching": reaching}
+PAPER = ("levels", "avoidance", "reaching")
 """Figures that need no source: they run what they show."""
+
+MANIFEST = "manifest.json"  # of a benchmark's store
 
 
 def paper_parts(names: Sequence[str]) -> list[Part]:
@@ -27,7 +22,12 @@ def paper_parts(names: Sequence[str]) -> list[Part]:
     for name in names:
         if name not in PAPER:
             raise unknown_name("figure", name, PAPER)
-    return [PAPER[name]() for name in names]
+    from cdfctl.report.figures.avoidance import avoidance
+    from cdfctl.report.figures.levels import levels
+    from cdfctl.report.figures.reaching import reaching
+
+    makers = {"levels": levels, "avoidance": avoidance, "reaching": reaching}
+    return [makers[name]() for name in names]
 
 
 def source_parts(source: Path, names: Sequence[str], fields: tuple[str, ...] | None, at: Sequence[float]) -> list[Part]:
@@ -42,8 +42,7 @@ def source_parts(source: Path, names: Sequence[str], fields: tuple[str, ...] | N
     Raises:
         InputError: the source is neither, or damaged; a name is unknown; ``fields`` or ``at`` do not apply.
     """
-    bench = is_store(source)
-    parts = _of_bench(source, fields, at) if bench else _of_run(source, fields, at)
+    parts = _of_bench(source, fields, at) if (source / MANIFEST).is_file() else _of_run(source, fields, at)
     if not names or list(names) == [OVERVIEW]:
         # Of a sweep, the panels of the other figures would be one a combination: they are there to be asked for.
         return parts[:1] if parts[0].name == "sweep" else parts
@@ -57,11 +56,20 @@ def source_parts(source: Path, names: Sequence[str], fields: tuple[str, ...] | N
 def _of_bench(source: Path, fields: tuple[str, ...] | None, at: Sequence[float]) -> list[Part]:
     if fields is not None or at:
         raise InputError("--field and --at are for runs, and this is a benchmark")
+    from cdfctl.benchmark.reading import read_store
+    from cdfctl.report.figures.bench_panels import bench_parts
+    from cdfctl.report.figures.sweep import sweep_part, swept
+
     bench = read_store(source)
     return [*([sweep_part(bench)] if swept(bench) else []), *bench_parts(bench)]
 
 
 def _of_run(source: Path, fields: tuple[str, ...] | None, at: Sequence[float]) -> list[Part]:
+    from cdfctl.report.figures.joint_space import default_instants, joint_space
+    from cdfctl.report.figures.run_view import view_run
+    from cdfctl.report.figures.task_space import task_space
+    from cdfctl.report.figures.time_course import time_course
+
     view = view_run(source)
     parts = [task_space(view)] if view.in_plane else []
     if view.two_joints:

@@ -51,7 +51,7 @@ def joint_space(view: RunView, fields: Sequence[str], instants: Sequence[int], p
 
     def height(width: float) -> float:
         rows, columns = shape(width)
-        return rows * ((width - 2.9) / columns + 0.8) + 2.1
+        return rows * ((width - 2.9) / columns + 0.8) + (2.1 if width > 1.4 * COLUMN else 3.8)
 
     def draw(canvas: Canvas, width: float) -> None:
         _draw(canvas, view, fields, instants, points, turned=width <= 1.4 * COLUMN)
@@ -101,7 +101,8 @@ def _draw(
     rows, columns = (len(instants), len(fields)) if turned else (len(fields), len(instants))
     grid: Any = canvas.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     grid = grid.T if turned else grid
-    canvas.suptitle(view.title(), x=0.01, ha="left")
+    title = view.title()
+    canvas.suptitle(title.replace("; ", "\n", 1) if turned else title, x=0.01, ha="left")
     x, y = axis_values(view, points)
     maps = [both_maps(view.field("sdf"), view.scene(k), x, y) for k in instants]
     targets = [target_map(view, k, x, y) for k in instants]
@@ -120,7 +121,7 @@ def _draw(
                 axes.text(0.5, 0.05, "no obstacle in reach", transform=axes.transAxes, ha="center")
         bar = canvas.colorbar(filled, ax=list(axes_of_field), pad=0.01, aspect=30)
         bar.set_label(NAMES[name])
-    canvas.legend(handles=legend(view, "cdf" in fields), loc="outside lower center", ncols=5)
+    canvas.legend(handles=legend(view, "cdf" in fields), loc="outside lower center", ncols=2 if turned else 5)
 
 
 def draw_path(axes: Axes, view: RunView, k: int, *, contacts: bool, to_come: bool = True) -> None:

@@ -46,12 +46,12 @@ class Panel:
 PANELS = {"rad": Panel("Configuration-space distance", 0.5, 1.0), "m": Panel("Signed distance", 0.25, 0.5)}
 
 
-def levels(points: int = POINTS) -> Part:
-    """The four panels, from ``points`` values of either joint."""
+def levels(points: int | None = None) -> Part:
+    """The four panels, from ``points`` values of either joint; :data:`POINTS` without a number."""
     return Part(
         "levels",
         lambda width: 0.8 * width if width > 1.4 * COLUMN else 3.0 * width,
-        lambda canvas, width: _draw(canvas, width, points),
+        lambda canvas, width: _draw(canvas, width, points or POINTS),
         PAGE,
     )
 

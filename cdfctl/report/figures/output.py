@@ -46,6 +46,10 @@ def save_figure(figure: Figure, path: Path, dpi: int = DPI) -> None:
     draft = path.with_name(f".{path.name}.new")
     try:
         with styled():
+            engine = figure.get_layout_engine()
+            if engine is not None:  # once: saving would lay everything out twice
+                engine.execute(figure)
+                figure.set_layout_engine("none")
             figure.savefig(draft, format=suffix[1:], dpi=dpi, metadata=METADATA[suffix])
         draft.replace(path)
     except OSError as error:

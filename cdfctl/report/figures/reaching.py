@@ -12,8 +12,9 @@ import numpy as np
 
 from cdfctl.report.figures.field_map import both_maps, draw_map, draw_region, joint_axes, level_steps
 from cdfctl.report.figures.joint_space import axis_values, draw_path, legend, target_map
+from cdfctl.report.figures.made_run import made_run
 from cdfctl.report.figures.part import Part
-from cdfctl.report.figures.run_view import RunView, made_run
+from cdfctl.report.figures.run_view import RunView
 from cdfctl.report.figures.style import COLUMN, GREEN, GREY, grid, legend_above
 from cdfctl.report.figures.task_space import draw_arrows, draw_paths, draw_strobe, frame
 from cdfctl.report.figures.time_course import lyapunov, velocity

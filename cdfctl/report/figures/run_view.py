@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,12 +13,9 @@ from cdfctl.errors import InputError
 from cdfctl.fields.field import Field, make_field
 from cdfctl.report.figures.style import signed
 from cdfctl.robots.robot import Robot
-from cdfctl.scenario.library import load_scenario
-from cdfctl.scenario.overrides import Override
 from cdfctl.scenario.resolve import resolve
 from cdfctl.scenario.schema import HoldTask, JointGoalTask, ReachTask, Scenario
 from cdfctl.scenario.variants import variant_named
-from cdfctl.simulation.assemble import assemble
 from cdfctl.simulation.checks import robot_of
 from cdfctl.simulation.clearance import Clearance
 from cdfctl.simulation.motion import SceneMotion
@@ -115,7 +111,7 @@ class RunView:
     @cached_property
     def plan(self) -> tuple[Array, Array] | None:
         """What a predictive controller planned at each step: q (N, K, n) and t (N, K), NaN where nothing; or None."""
-        q, t = (getattr(self.trajectory, name, None) for name in ("plan_q", "plan_t"))
+        q, t = self.trajectory.plan_q, self.trajectory.plan_t
         if q is None or t is None or not np.isfinite(q).all(axis=2).any():
             return None
         return q, t
@@ -157,20 +153,12 @@ class RunView:
     def until(self, k: int) -> RunView:
         """The first ``k`` steps of the run, as a run."""
         ends = {"t", "q", "obstacle_pose", "obstacle_twist"}
+        fine = self.trajectory.plant_t
+        moments = 0 if fine is None else int(np.searchsorted(fine, self.t[k], side="right"))
         arrays: dict[str, Any] = {field.name: getattr(self.trajectory, field.name) for field in fields(self.trajectory)}
         cut: dict[str, Any] = {name: a if a is None else a[: k + (name in ends)].copy() for name, a in arrays.items()}
+        cut |= {name: arrays[name][:moments].copy() for name in ("plant_t", "plant_q") if arrays[name] is not None}
         return replace(self, trajectory=Trajectory(**cut))
-
-
-def made_run(name: str, overrides: Sequence[Override]) -> RunView:
-    """The run of a shipped scenario, made now: no folder is written."""
-    trial = assemble(load_scenario(name, overrides))
-    for _ in trial.run():
-        pass
-    result = trial.result()
-    task = trial.scenario.task
-    target = SceneMotion((task.target,)) if isinstance(task, ReachTask) else None
-    return RunView(trial.scenario, result.document(""), result.trajectory, trial.robot, trial.motion, target)
 
 
 def view_run(folder: Path) -> RunView:

@@ -111,7 +111,7 @@ def add_shape(axes: Axes, shape: Any, pose: Array, **style: Any) -> None:
 def draw_paths(axes: Axes, view: RunView) -> list[Any]:
     """Paths of the tip and of every joint that moves, and what a predictive controller planned for the tip."""
     skeleton = Skeleton(view.robot)
-    points = skeleton.points(dense(view.trajectory.q))
+    points = skeleton.points(dense(view.trajectory.path[1]))
     moving = [i for i in range(1, view.robot.n) if np.ptp(points[:, i], axis=0).max() > 1e-6]
     handles = []
     if view.plan is not None:

@@ -77,7 +77,7 @@ def _draw(canvas: Canvas, view: RunView, shown: list[Panel], columns: int) -> No
         last = every[min((column + 1) * rows, len(shown)) - 1]
         last.set_xlabel("time [s]")
         last.tick_params(labelbottom=True)
-    canvas.legend(handles=_marks(view), loc="outside lower center", ncols=4)
+    canvas.legend(handles=_marks(view), loc="outside lower center", ncols=5 if columns > 1 else 2)
 
 
 def panels(view: RunView) -> Iterator[Panel]:

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdfctl.report.figures.run_view import RunView, made_run
+from cdfctl.report.figures.made_run import made_run
+from cdfctl.report.figures.run_view import RunView
 from cdfctl.scenario.overrides import parse_override
 
 
