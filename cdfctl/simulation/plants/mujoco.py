@@ -91,7 +91,7 @@ class MujocoPlant(Plant):
             if data.ncon:
                 self._note_contact(now)
         if not np.abs(data.qvel).max() < UNSTABLE:  # also where it is not a number
-            raise PlantError(f"the physics became unstable at {state.t:g} s", hint="take a smaller plant.timestep")
+            raise PlantError(f"the physics became unstable at {state.t:g} s: take a smaller plant.timestep")
         self._track = Track(t[: done - 1], q[: done - 1])
         self._velocity_errors.append(data.qvel - u)
         self._position_errors.append(q[done - 1] - state.q - u * (t[done - 1] - state.t))
