@@ -12,7 +12,14 @@ author = "The cdfctl developers"
 project_copyright = "the cdfctl developers"
 release = version = cdfctl.__version__
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "generated", "experiment"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.mathjax",
+    "generated",
+    "experiment",
+]
 exclude_patterns = ["_build"]
 html_theme = "furo"
 html_title = "cdfctl"
