@@ -44,7 +44,7 @@ class Shown(StrEnum):
 def plot(
     source: Annotated[
         Path | None,
-        typer.Argument(metavar="[RUN|BENCH]", help="A run folder, or a benchmark's folder.", show_default=False),
+        typer.Argument(metavar="RUN|BENCH", help="A run folder, or a benchmark's folder.", show_default=False),
     ] = None,
     figure: Annotated[
         list[str] | None,
