@@ -177,6 +177,15 @@ def test_a_run_without_a_step_is_drawn(small_run):
     figure.draw_without_rendering()
 
 
+def test_a_part_of_a_run_has_the_moments_of_its_plant_until_then(small_run):
+    fine = np.linspace(0.0, small_run.t[-1], 4 * small_run.steps + 1)
+    q = np.stack([np.interp(fine, small_run.t, column) for column in small_run.trajectory.q.T], axis=1)
+    view = replace(small_run, trajectory=replace(small_run.trajectory, plant_t=fine, plant_q=q))
+    t, path = view.until(3).trajectory.path
+    assert t[-1] == pytest.approx(small_run.t[3])
+    np.testing.assert_allclose(path[-1], small_run.trajectory.q[3], atol=1e-9)
+
+
 def test_the_instants_are_start_least_clearance_and_end(small_run):
     times, found = small_run.clearance
     nearest = int(np.argmin(found[:, 0]))
