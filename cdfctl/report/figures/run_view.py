@@ -154,7 +154,7 @@ class RunView:
         """The first ``k`` steps of the run, as a run."""
         ends = {"t", "q", "obstacle_pose", "obstacle_twist"}
         fine = self.trajectory.plant_t
-        moments = 0 if fine is None else int(np.searchsorted(fine, self.t[k], side="right"))
+        moments = 0 if fine is None else int(np.searchsorted(fine, self.t[k] + 1e-9, side="right"))
         arrays: dict[str, Any] = {field.name: getattr(self.trajectory, field.name) for field in fields(self.trajectory)}
         cut: dict[str, Any] = {name: a if a is None else a[: k + (name in ends)].copy() for name, a in arrays.items()}
         cut |= {name: arrays[name][:moments].copy() for name in ("plant_t", "plant_q") if arrays[name] is not None}
