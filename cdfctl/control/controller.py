@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -27,6 +27,9 @@ from cdfctl.robots.robot import Robot
 from cdfctl.scenario.schema import ControllerConfig, HoldTask, JointGoalTask, ReachTask, Task
 from cdfctl.scenario.variants import TASKS_OF
 from cdfctl.types import Array, BoolArray, Decision, Scene, State, as_vector
+
+if TYPE_CHECKING:
+    from cdfctl.control.prediction import KnownMotion
 
 Nominal = Callable[[State, Scene], Array]
 Pursuit = Callable[[State, Scene], Decision]
@@ -71,8 +74,12 @@ class Controller:
             self.reaching.reset()
 
 
-def build(robot: Robot, config: ControllerConfig, task: Task, dt: float) -> Controller:
+def build(
+    robot: Robot, config: ControllerConfig, task: Task, dt: float, motion: KnownMotion | None = None
+) -> Controller:
     """Wire field, rows, QP and task as the controller section says; ``dt`` is the control period, s.
+
+    ``motion`` is that of the obstacles: it reaches the controller only under ``prediction: known``.
 
     Raises:
         InputError: a solver that is not installed, a goal or weights that do not fit the robot, a task the variant
@@ -85,7 +92,7 @@ def build(robot: Robot, config: ControllerConfig, task: Task, dt: float) -> Cont
     reaching = None
     if isinstance(task, ReachTask):
         reaching = Reaching(make_field(variant.field, robot), parameters.gamma, dt)
-    core = core_of(robot, variant, parameters, dt)
+    core = core_of(robot, variant, parameters, dt, motion if parameters.prediction == "known" else None)
     return Controller(core, nominal(robot, task, parameters.gain), reaching, _pursuit(core, task))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,6 +27,9 @@ from cdfctl.fields.self_distance import SelfDistance
 from cdfctl.robots.robot import Robot
 from cdfctl.scenario.variants import FieldKind, Variant
 from cdfctl.types import Array, Decision, FieldQuery, IntArray, Rows, Scene, SelfQuery
+
+if TYPE_CHECKING:
+    from cdfctl.control.prediction import KnownMotion
 
 # The fields a variant asks, the one whose barrier is reported as h first.
 FIELDS_OF: Mapping[FieldKind, tuple[str, ...]] = {"sdf": ("sdf",), "cdf": ("cdf",), "dual": ("cdf", "sdf")}
@@ -184,12 +188,18 @@ class Core:
         return [f"bound of {self.robot.joint_names[j]}" for j in np.flatnonzero(held)]
 
 
-def core_of(robot: Robot, variant: Variant, parameters: Parameters, dt: float) -> Core:
-    """The core that a variant asks for. Raises :class:`InputError` as :class:`Core`."""
+def core_of(
+    robot: Robot, variant: Variant, parameters: Parameters, dt: float, known: KnownMotion | None = None
+) -> Core:
+    """The core that a variant asks for; ``known`` is the obstacles' motion, where it is given away.
+
+    Raises:
+        InputError: as :class:`Core`.
+    """
     if variant.plans:
         from cdfctl.control.predictive import PredictiveCore
 
-        return PredictiveCore(robot, variant, parameters, dt)
+        return PredictiveCore(robot, variant, parameters, dt, known)
     return Core(robot, variant, parameters, dt)
 
 

@@ -51,7 +51,7 @@ class Prediction:
     delay: float = 0.0
     position_error: float = 0.0
     velocity_error: float = 0.0
-    span: float = 30.0
+    span: float = 20.0
 
 
 class Predictor:

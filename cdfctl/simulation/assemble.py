@@ -150,7 +150,7 @@ def _assemble(scenario: Scenario, trial: int, robot: Robot) -> Trial:
     motion, guard = SceneMotion(scenario.obstacles), None
     if scenario.feed is not None:
         motion = MeasuredMotion(scenario.obstacles, scenario.feed)
-    controller = build(robot, scenario.controller, scenario.task, simulation.dt)
+    controller = build(robot, scenario.controller, scenario.task, simulation.dt, motion)
     target: SceneMotion | None = None
     goal: Goal
     if isinstance(scenario.task, ReachTask):

@@ -30,6 +30,11 @@ class _Path(Protocol):
     def twist(self, t: float) -> Array: ...
     def max_speed(self, t0: float, t1: float) -> float: ...
     def max_angular_speed(self, t0: float, t1: float) -> float: ...
+    def times(self, t0: float, t1: float) -> list[float]: ...
+
+
+CHORD = 0.05
+"""s: a sinusoid is known to a controller as straight lines of this duration."""
 
 
 class SceneMotion:
@@ -95,6 +100,21 @@ class SceneMotion:
     def close(self) -> None:
         """Nothing more will be asked of it but what is settled."""
 
+    def pieces(self, name: str, start: float, end: float) -> tuple[Array, Array, Array] | None:
+        """The motion of the obstacle ``name`` within [start, end] (s) as pieces of constant twist: when they begin
+        (K,), the poses then (K, 7), the twists from then on (K, 6); None for one constant twist."""
+        path = self._paths.get(self.names.index(name))
+        if path is None:
+            return None
+        times = np.array([start, *path.times(start, end)])
+        poses = np.array([path.pose(t) for t in times])
+        twists = np.array([path.twist(t) for t in times])
+        if isinstance(path, _Sinusoid):
+            after = np.append(times[1:], times[-1] + CHORD)
+            there = np.array([path.pose(t) for t in after])
+            twists[:, :3] = (there - poses)[:, :3] / (after - times)[:, None]
+        return times, poses, twists
+
     def max_speed(self, i: int, t0: float, t1: float) -> float:
         """Bound on the speed (m/s) of obstacle ``i``'s origin within [t0, t1]."""
         path = self._paths.get(i)
@@ -145,6 +165,9 @@ class _Waypoints:
     def max_angular_speed(self, t0: float, t1: float) -> float:
         return self._fastest(t0, t1, slice(3, 6))
 
+    def times(self, t0: float, t1: float) -> list[float]:
+        return [float(t) for t in self._times if t0 < t < t1]
+
 
 class _Sinusoid:
     def __init__(self, motion: SinusoidMotion, pose0: Array) -> None:
@@ -171,6 +194,9 @@ class _Sinusoid:
 
     def max_angular_speed(self, t0: float, t1: float) -> float:
         return 0.0
+
+    def times(self, t0: float, t1: float) -> list[float]:
+        return np.arange(t0 + CHORD, t1, CHORD).tolist()
 
 
 def _name(body: Body, index: int) -> str:

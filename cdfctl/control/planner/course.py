@@ -49,9 +49,13 @@ class Course(NamedTuple):
 @njit_inline
 def pose_at(knot: Array, rotation: Array, position: Array, twist: Array, o: int, t: float) -> tuple[Rot, Vec]:
     """Rotation and origin of obstacle o at time t; the arrays are those of :class:`Course`."""
-    k = 0
-    while k + 1 < knot.shape[1] and knot[o, k + 1] <= t:
-        k += 1
+    k, after = 0, knot.shape[1]
+    while after - k > 1:  # the last piece that has begun
+        middle = (k + after) // 2
+        if knot[o, middle] <= t:
+            k = middle
+        else:
+            after = middle
     s = t - knot[o, k]
     r, p = rot(rotation[o], k), along(vec(position[o], k), s, vec(twist[o], k))
     wx, wy, wz = twist[o, k, 3], twist[o, k, 4], twist[o, k, 5]

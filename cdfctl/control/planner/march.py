@@ -132,9 +132,9 @@ def place(arm: Arm, q: Array, u: Array, s: float, space: Space) -> None:
 
 @njit
 def march(
-    arm: Arm, course: Course, q: Array, u: Array, start: float, end: float, near: float, space: Space
+    arm: Arm, course: Course, q: Array, u: Array, start: float, end: float, near: float, ease: float, space: Space
 ) -> tuple[float, float]:
-    """Follow q + u (t - start) from ``start`` to ``end`` (s from now).
+    """Follow q + u (t - start) from ``start`` to ``end`` (s from now), every margin less by ``ease`` (m).
 
     Returns the time at which a margin is found broken, inf for none, and the least distance seen, at most ``near`` (m),
     less the widening of the margin.
@@ -173,8 +173,10 @@ def march(
                 c = rotate(r, vec(course.block, i))
                 x, y, z = p[0] + c[0], p[1] + c[1], p[2] + c[2]
             margin = min(course.margin[o, 0] + t * course.margin[o, 1], course.margin[o, 2])
+            eased = min(ease, margin / 3.0)
+            margin -= eased
             step = min(STEP, max(LEAST_STEP, 0.5 * margin))
-            widened = margin - course.margin[o, 0]
+            widened = margin + eased - course.margin[o, 0]
             ball, pace_i = course.block[i, 3], course.pace[i]
             ahead = LONG
             if piece.shape[0] > 0:

@@ -12,7 +12,7 @@ from math import inf
 from cdfctl.control.planner.arm import Arm
 from cdfctl.control.planner.course import Course
 from cdfctl.control.planner.jit import njit
-from cdfctl.control.planner.march import Space, march
+from cdfctl.control.planner.march import STEP, Space, march
 from cdfctl.control.planner.plan import CLEAR, Aim, Plan, bound_motion, free_cost, hit_cost, straight
 from cdfctl.control.planner.random import Stream, uniform
 from cdfctl.control.planner.tree import (
@@ -62,8 +62,10 @@ def search(
             return enough
         if space.looks[0] >= effort:
             return c
-        node, count = 0, 0
+        node, count, ease = 0, 0, 0.0
         if c == 0:
+            # It was free, but for the STEP that a check may miss: seen from another instant, that must not end it.
+            ease = STEP
             plant(tree, q)
             while count < tree.tau.shape[0] and best.tau[count] > 0.0:
                 tree.tau[count] = best.tau[count]
@@ -82,12 +84,14 @@ def search(
                     node = propose_random(aim, tree, stream)
             if count == 0 or node < 0:
                 continue
-        _follow(arm, course, aim, best, tree, node, count, space)
+        _follow(arm, course, aim, best, tree, node, count, ease, space)
     return enough
 
 
 @njit
-def _follow(arm: Arm, course: Course, aim: Aim, best: Plan, tree: Tree, node: int, count: int, space: Space) -> None:
+def _follow(
+    arm: Arm, course: Course, aim: Aim, best: Plan, tree: Tree, node: int, count: int, ease: float, space: Space
+) -> None:
     """Try ``count`` motions from ``node``, then the straight way, then rest: new nodes, and perhaps a better plan.
 
     All is one loop about one call of the march: each call more would cost the compiler as long again.
@@ -124,7 +128,7 @@ def _follow(arm: Arm, course: Course, aim: Aim, best: Plan, tree: Tree, node: in
                 tree.work[j] = tree.q[node, j] + tree.move[way, j] * (arrival - start)
                 u[j] = 0.0
             start, tau = arrival, max(must, REST)
-        hit, d = march(arm, course, tree.work, u, start, start + tau, CLEAR, space)
+        hit, d = march(arm, course, tree.work, u, start, start + tau, CLEAR, ease, space)
         least = min(least, d)
         if i < count:
             if hit < inf:
