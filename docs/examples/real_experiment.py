@@ -13,10 +13,13 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
+import select
 import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -42,6 +45,7 @@ def serve(hosts: list[str], start: list[float], base: list[float]) -> None:
     import franky_sim
     from franky_sim.mujoco_simulator import MujocoSimulator
 
+    threading.Thread(target=_end_with_the_parent, daemon=True).start()
     with MujocoSimulator() as simulator:
         simulator.add_robot(initial_q=start)
         simulator.add_robot(initial_q=HOME, position=tuple(base))
@@ -68,18 +72,25 @@ def carry(host: str, port: int, base: list[float], speed: float) -> None:
                 line = {"name": name, "t": t, "position": (hand + offset).tolist()}
                 outlet.sendto(json.dumps(line).encode(), ("127.0.0.1", port))
             sent = t
-        if not going:
-            going = _told()
-        elif hand[2] > HAND[2] - DOWN - 0.02:
+        going = _told() or going
+        if going and hand[2] > HAND[2] - DOWN - 0.02:
             # Renewed at every turn: like the first arm, this one stops by itself when nobody tells it to go on.
             robot.move(franky.CartesianVelocityMotion(down, duration=franky.Duration(100)), asynchronous=True)
         time.sleep(0.004)
 
 
 def _told() -> bool:
-    import select
+    """Whether a line has come on standard input; its end, which is that of who started this process, ends this one."""
+    if not select.select([sys.stdin], [], [], 0.0)[0]:
+        return False
+    if not sys.stdin.readline():
+        raise SystemExit
+    return True
 
-    return bool(select.select([sys.stdin], [], [], 0.0)[0]) and bool(sys.stdin.readline())
+
+def _end_with_the_parent() -> None:
+    sys.stdin.read()
+    os._exit(0)
 
 
 @contextmanager

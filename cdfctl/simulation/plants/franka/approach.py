@@ -12,6 +12,7 @@ from cdfctl.scenario.resolve import resolve_controller
 from cdfctl.scenario.schema import ControllerConfig, JointGoalTask, Scenario
 from cdfctl.scenario.variants import TASKS_OF, VARIANTS
 from cdfctl.simulation.motion import SceneMotion
+from cdfctl.simulation.stream.motion import MeasuredMotion
 from cdfctl.types import Array, Scene, State
 
 
@@ -24,18 +25,24 @@ class SlowApproach:
         self._slow = replace(robot, velocity_limit=np.minimum(robot.velocity_limit, speed))
         self._controller: Controller | None = None
 
-    def __call__(self, q: Array) -> Array:
-        """The velocity (n,), rad/s, at ``q`` (n,)."""
+    def __call__(self, t: float, q: Array) -> Array:
+        """The velocity (n,), rad/s, at ``q`` (n,), ``t`` (s) after setting out; 0 while an obstacle's place is not
+        known."""
         if self._controller is None:
             scenario = self._scenario
             task = JointGoalTask(type="joint-goal", goal=scenario.robot.q0)
             config = controller_for(scenario.controller)
             self._controller = build(self._slow, config, task, scenario.simulation.dt)
-        return self._controller.step(State(0.0, q), self._scene()).u
+        scene = self._scene(t)
+        if isinstance(self._motion, MeasuredMotion) and self._motion.stale(t):
+            return np.zeros_like(q)
+        return self._controller.step(State(t, q), scene).u
 
-    def _scene(self) -> Scene:
-        """The obstacles at t = 0: those of the scenario stand still there, measured ones are where they are."""
+    def _scene(self, t: float) -> Scene:
+        """The obstacles: declared ones stand still where they are at t = 0, measured ones are where they are."""
         motion = self._motion
+        if isinstance(motion, MeasuredMotion):
+            return motion.at(t)
         return Scene.from_arrays(motion.shapes, motion.names, motion.poses(0.0), np.zeros((len(motion), 6)))
 
 

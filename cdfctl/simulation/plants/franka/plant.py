@@ -25,8 +25,9 @@ from cdfctl.types import Array, State
 HOLD_TICKS = 2.5
 """Control steps a command is kept without a new one, where the scenario does not say."""
 
-Approach = Callable[[Array], Array]
-"""The joint velocity (n,), rad/s, that takes the arm from q (n,) to the start, slowly and by the safety rows."""
+Approach = Callable[[float, Array], Array]
+"""The joint velocity (n,), rad/s, that takes the arm from q (n,) to the start, slowly and by the safety rows; the first
+argument is the time since it set out, s."""
 
 APPROACH_FACTOR = 4.0
 """An approach may take this many times what it takes in a straight line at its speed, and not less than 10 s."""
@@ -160,16 +161,17 @@ class FrankaPlant(Plant):
         q, tolerance = ticks.first.q, 0.5 * self._config.start_tolerance
         distance = float(np.abs(q0 - q).max())
         limit = max(10.0, APPROACH_FACTOR * distance / self._config.approach_speed)
-        now = ticks.first
+        t = 0.0
         while self._far(q, q0, tolerance):
-            now, _ = ticks.step(self._within(q, self._approach(q)))
-            q, self._approached = now.q, now.t
-            if now.t > limit:
-                where = self._where(q, q0)
+            now, _ = ticks.step(self._within(q, self._approach(t, q)))
+            t, q = now.t, now.q
+            if t > limit:
                 raise PlantError(
-                    f"{self._config.host}: the arm does not get to the scenario's start in {limit:.0f} s: {where}"
+                    f"{self._config.host}: the arm does not get to the scenario's start in {limit:.0f} s: "
+                    f"{self._where(q, q0)}"
                 )
-        while np.abs(ticks.step(np.zeros_like(q))[0].dq).max() > 0.01:
+        self._approached = t
+        while ticks.step(np.zeros_like(q))[0].t < t + SETTLING:
             pass
 
     def _far(self, q: Array, q0: Array, tolerance: float) -> bool:

@@ -42,7 +42,7 @@ def franky(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 
 def plant_of(**options: Any) -> FrankaPlant:
     config = FrankaConfig(type="franka", **options)
-    return FrankaPlant(config, load_robot("fr3"), 0.01, connect, lambda q: np.clip(4.0 * (START - q), -0.2, 0.2))
+    return FrankaPlant(config, load_robot("fr3"), 0.01, connect, lambda t, q: np.clip(4.0 * (START - q), -0.2, 0.2))
 
 
 def ended(trial: Trial) -> Any:
@@ -117,11 +117,14 @@ def test_a_reflex_before_the_run_is_recovered_from(franky: ModuleType) -> None:
     assert franky.Robot.newest.recovered == 1
 
 
-def test_a_user_stop_is_respected(franky: ModuleType) -> None:
+def test_a_user_stop_is_respected(franky: ModuleType, scenario: Any, tmp_path: Path, capsys: Any) -> None:
     franky.Robot.mode = franky.RobotMode.UserStopped
     with pytest.raises(PlantError, match="the arm is in mode UserStopped"):
         plant_of().start(START)
     assert franky.Robot.newest.sent == []
+    assert main(["run", str(scenario("127.0.0.1")), "--out", str(tmp_path / "run"), "--quiet"]) == 4
+    told = capsys.readouterr().err
+    assert told.startswith("cdfctl: error: 127.0.0.1: the arm is in mode UserStopped")
 
 
 def test_a_late_command_is_counted(franky: ModuleType) -> None:
