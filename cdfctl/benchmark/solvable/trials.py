@@ -73,7 +73,7 @@ def check_solvable(scenario: Scenario) -> None:
     if joints != 2:
         raise InputError(
             f"--solvable needs a robot with two joints; that of '{scenario.name}' has {joints}",
-            "it searches a grid over both joints and time",
+            "it searches a grid over both joints and time; robot.lock leaves fewer joints",
         )
     if not isinstance(scenario.task, JointGoalTask | HoldTask):
         raise InputError(
