@@ -188,7 +188,8 @@ def frame(axes: Axes, view: RunView, picked: IntArray) -> None:
         origins += [view.target.poses(float(view.t[k]))[:, :2] for k in picked]
     near = np.concatenate(origins)
     near = near[np.linalg.norm(near - base, axis=1) < 1.25 * reach]
-    seen = np.concatenate([points.reshape(-1, 2), near])
+    size = min(max((radius_of(shape) for shape in view.motion.shapes), default=0.0) + 0.1 * reach, 0.4 * reach)
+    seen = np.concatenate([points.reshape(-1, 2), near - size, near + size])  # the body, and its time beside it
     low, high = seen.min(axis=0), seen.max(axis=0)
     pad = 0.12 * reach
     axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
