@@ -161,7 +161,7 @@ def progress_bar(what: str, *, quiet: bool) -> Iterator[Progress | None]:
 
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=stderr(), transient=True) as bar:
-        task = bar.add_task(f"{what} (a first build compiles)", total=None)
+        task = bar.add_task(f"{what} (a first build compiles for a minute)", total=None)
 
         def progress(done: int, total: int) -> None:
             bar.update(task, completed=done, total=total, description=what if done else None)

@@ -92,7 +92,9 @@ def follow(wired: Trial, *, quiet: bool, kept: Journal) -> bool:
         columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[clock]}"))
         with Progress(*columns, console=stderr(), transient=True) as progress:
             # The first step of a first run waits for the compiler.
-            bar = progress.add_task("preparing (a first run compiles)", total=wired.rollout.max_steps, clock="")
+            bar = progress.add_task(
+                "preparing (a first run compiles for a minute)", total=wired.rollout.max_steps, clock=""
+            )
             for step in kept.through(steps):
                 if interrupted():
                     return False

@@ -15,6 +15,7 @@ d_c, and not hidden here:
 
 from __future__ import annotations
 
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from cdfctl.errors import InputError
 from cdfctl.fields.kernel.body import body_of
-from cdfctl.fields.kernel.cdf_rows import contact_rows, new_contact_rows, new_workspace
+from cdfctl.fields.kernel.cdf_rows import Workspace, contact_rows, new_contact_rows, new_workspace
 from cdfctl.fields.kernel.parts import SceneParts
 from cdfctl.fields.kernel.search import Memory, new_memory
 from cdfctl.fields.kernel.starts import Table, empty_table
@@ -47,9 +48,14 @@ class CDF:
         self.robot = robot
         self._body = body_of(robot)
         self._table = empty_table(robot.n) if table is None else table
-        self._work = new_workspace(self._body, MOST_SHEETS + SPARE_MEMORY)
         self._parts = SceneParts()
+        self._rows = new_contact_rows(0, 1, robot.n)
         self.reset()
+
+    @cached_property
+    def _work(self) -> Workspace:
+        """Made at the first query, not before: where the kernels are not compiled yet, that begins here."""
+        return new_workspace(self._body, MOST_SHEETS + SPARE_MEMORY)
 
     def query(self, q: ArrayLike, scene: Scene) -> FieldQuery:
         """The nearest contact of each obstacle, one row an obstacle, in the scene's order.
@@ -79,7 +85,9 @@ class CDF:
     def _query(self, q: ArrayLike, scene: Scene, sheets: int, *, every_obstacle: bool) -> FieldQuery:
         point, parts = as_vector(q, self.robot.n, "q"), self._parts.of(scene)
         m = len(scene)
-        rows = new_contact_rows(m, sheets, self.robot.n)
+        if self._rows.d.shape != (m, sheets):
+            self._rows = new_contact_rows(m, sheets, self.robot.n)
+        rows = self._rows
         contact_rows(self._body, point, parts, self._remember(scene.names), self._table, sheets, rows, self._work)
         empty = rows.filled == 0
         rows.d[empty & (rows.f < 0.0), 0] = -np.inf
@@ -106,8 +114,8 @@ class CDF:
             self._memory = new_memory(len(names), old.piece.shape[1], self.robot.n)
             for i, name in enumerate(names):
                 if name in places:
-                    for new_array, old_array in zip(self._memory[:-1], old[:-1], strict=True):
-                        new_array[i] = old_array[places[name]]
+                    for member in ("known", "piece", "x"):
+                        getattr(self._memory, member)[i] = getattr(old, member)[places[name]]
             self._memory.turn[:] = old.turn
         self._names = names
         return self._memory

@@ -10,11 +10,13 @@ its convex parts. In penetration, ν is the direction in which the obstacle leav
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cdfctl.fields.kernel.body import body_of, new_frames
-from cdfctl.fields.kernel.distance import new_work
+from cdfctl.fields.kernel.distance import Work, new_work
 from cdfctl.fields.kernel.parts import SceneParts
 from cdfctl.fields.kernel.rows import Answer, link_rows, nearest_rows, new_answer
 from cdfctl.robots.robot import Robot
@@ -30,8 +32,13 @@ class SDF:
         self.robot = robot
         self._body = body_of(robot)
         self._frames = new_frames(self._body)
-        self._work = new_work()
         self._parts = SceneParts()
+        self._answer = new_answer(0, robot.n)
+
+    @cached_property
+    def _work(self) -> Work:
+        """Made at the first query, not before: where the kernels are not compiled yet, that begins here."""
+        return new_work()
 
     def query(self, q: ArrayLike, scene: Scene) -> FieldQuery:
         """One row an obstacle, in the scene's order: the link nearest to it.
@@ -43,7 +50,7 @@ class SDF:
             InputError: ``q`` has not n numbers, or a number of ``q`` or of the scene is not finite.
         """
         point, parts = as_vector(q, self.robot.n, "q"), self._parts.of(scene)
-        answer = new_answer(len(scene), self.robot.n)
+        answer = self._room(len(scene))
         nearest_rows(self._body, point, parts, self._frames, self._work, answer)
         return _rows(answer, np.arange(len(scene), dtype=np.int64))
 
@@ -55,7 +62,7 @@ class SDF:
         """
         point, parts = as_vector(q, self.robot.n, "q"), self._parts.of(scene)
         links = len(self.robot.links)
-        answer = new_answer(len(scene) * links, self.robot.n)
+        answer = self._room(len(scene) * links)
         link_rows(self._body, point, parts, self._frames, self._work, answer)
         return _rows(answer, np.repeat(np.arange(len(scene), dtype=np.int64), links))
 
@@ -66,15 +73,20 @@ class SDF:
     def reset(self) -> None:
         """Nothing to forget: an answer depends on its question only."""
 
+    def _room(self, r: int) -> Answer:
+        if len(self._answer.d) != r:
+            self._answer = new_answer(r, self.robot.n)
+        return self._answer
+
 
 def _rows(answer: Answer, obstacle: IntArray) -> FieldQuery:
     return FieldQuery(
         obstacle=obstacle,
-        link=answer.link,
-        d=answer.d,
-        dq=answer.dq,
-        dt=answer.dt,
-        valid=answer.valid,
+        link=answer.link.copy(),
+        d=answer.d.copy(),
+        dq=answer.dq.copy(),
+        dt=answer.dt.copy(),
+        valid=answer.valid.copy(),
         contact_q=np.full(answer.dq.shape, np.nan),
         unit="m",
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -45,7 +46,7 @@ def test_the_residual_is_that_of_the_entries(planar: Robot, table: Table, report
     ]
     assert report.residual.max <= max(every) + 1e-12
     assert report.residual.max <= 1e-4
-    wrong = table._replace(q=table.q + np.float32(0.01))
+    wrong = replace(table, q=table.q + np.float32(0.01))
     assert measure_accuracy(planar, wrong, 0.05, 0, points=1, jobs=1).residual.max > 1e-3
 
 
@@ -59,7 +60,7 @@ def test_coverage_is_of_points_the_arm_can_reach(report: Accuracy) -> None:
 
 def test_a_table_without_entries_covers_nothing_and_adds_nothing(planar: Robot, table: Table) -> None:
     count = len(table.first)
-    empty = table._replace(first=np.zeros(count, dtype=np.int64), piece=table.piece[:0].copy(), q=table.q[:0].copy())
+    empty = replace(table, first=np.zeros(count, dtype=np.int64), piece=table.piece[:0].copy(), q=table.q[:0].copy())
     bare = measure_accuracy(planar, empty, 0.05, 0, points=POINTS, jobs=1)
     ways = {way.way: way for way in bare.comparison}
     assert bare.coverage.covered == 0

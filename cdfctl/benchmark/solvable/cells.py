@@ -59,7 +59,7 @@ def free_cells(
                 continue
             if t >= until[i, j]:
                 q[0], q[1] = first[i], second[j]
-                forward(body, q, frames)
+                forward(body, q, frames, 0)
                 hold = _measure(body, frames, parts, speed, widths, margin, work)
                 free[i, j] = hold > 0.0
                 until[i, j] = t + abs(hold)
@@ -72,7 +72,7 @@ def _measure(body: Body, frames: Frames, parts: Parts, speed: Array, widths: Arr
     hold = LONGEST
     for k in range(body.joint.shape[0]):
         least = margin if widths[0] + widths[1] == 0.0 else -_within_cell(body, frames, k, widths) - EXACT
-        r_a, t_a = piece_pose(body, frames, k)
+        r_a, t_a = piece_pose(body, frames, 0, k)
         for p in range(parts.obstacle.shape[0]):
             v = speed[parts.obstacle[p]]
             r, t = relative_pose(r_a, t_a, parts, p)
@@ -91,7 +91,7 @@ def _measure(body: Body, frames: Frames, parts: Parts, speed: Array, widths: Arr
 def _within_cell(body: Body, frames: Frames, k: int, widths: Array) -> float:
     """The greatest way of a point of piece k from a cell's centre to anywhere in the cell, m."""
     chain, carrier = body.chain, body.joint[k]
-    r, t = piece_pose(body, frames, k)
+    r, t = piece_pose(body, frames, 0, k)
     info = body.sets.info[k]
     centre, radius = add(rotate(r, vec3(info.centre)), t), info.reach + info.radius
     way = 0.0
@@ -100,7 +100,7 @@ def _within_cell(body: Body, frames: Frames, k: int, widths: Array) -> float:
             continue
         lever = 1.0
         if not chain.prismatic[j]:
-            arm = cross(sub(centre, vec(frames.translation, j)), vec(frames.axis, j))
+            arm = cross(sub(centre, vec(frames.translation[0], j)), vec(frames.axis[0], j))
             lever = norm(arm) + radius + way
         way += 0.5 * widths[j] * lever
     return way

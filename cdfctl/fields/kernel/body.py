@@ -11,18 +11,32 @@ from __future__ import annotations
 
 from functools import lru_cache
 from math import cos, sin
-from typing import NamedTuple
 
 import numpy as np
 
 from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.sets import ConvexSets, pack
+from cdfctl.fields.kernel.structs import Struct
 from cdfctl.fields.kernel.vec import Rot, Vec, add, compose, cross, dot, rot, rotate, scale, store, store_rot, sub, vec
-from cdfctl.robots.robot import Chain, Robot
-from cdfctl.types import Array, IntArray
+from cdfctl.robots.robot import Robot
+from cdfctl.types import Array, BoolArray, IntArray
 
 
-class Body(NamedTuple):
+class Chain(Struct):
+    """The kinematic tree: what :class:`cdfctl.robots.robot.Chain` says, under the same names."""
+
+    parent: IntArray
+    rotation: Array
+    translation: Array
+    axis: Array
+    prismatic: BoolArray
+    moves: BoolArray
+    lower: Array
+    upper: Array
+    continuous: BoolArray
+
+
+class Body(Struct):
     """A robot as arrays: n joints, k pieces in the order of their links.
 
     Attributes:
@@ -43,12 +57,12 @@ class Body(NamedTuple):
     translation: Array
 
 
-class Frames(NamedTuple):
-    """Workspace: where the joints are, in the world.
+class Frames(Struct):
+    """Workspace: where the joints are, in the world, at each of c configurations.
 
     Attributes:
-        rotation, translation: (n, 3, 3), (n, 3) placement of joint i, its own motion included.
-        axis: (n, 3) axis of joint i.
+        rotation, translation: (c, n, 3, 3), (c, n, 3) placement of joint i, its own motion included.
+        axis: (c, n, 3) axis of joint i.
     """
 
     rotation: Array
@@ -63,8 +77,7 @@ def body_of(robot: Robot) -> Body:
     k = len(pieces)
     link = np.array([p.link for p in pieces], dtype=np.int64)
     return Body(
-        # Copies: numba compiles anew for read-only arrays.
-        chain=Chain._make(np.array(part) for part in robot.chain),
+        chain=Chain(**{name: np.array(part) for name, part in robot.chain._asdict().items()}),
         sets=pack(pieces),
         joint=np.array([p.joint for p in pieces], dtype=np.int64),
         link=link,
@@ -74,35 +87,35 @@ def body_of(robot: Robot) -> Body:
     )
 
 
-def new_frames(body: Body) -> Frames:
-    """An empty workspace."""
+def new_frames(body: Body, c: int = 1) -> Frames:
+    """An empty workspace for ``c`` configurations."""
     n = len(body.chain.parent)
-    return Frames(np.zeros((n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3)))
+    return Frames(np.zeros((c, n, 3, 3)), np.zeros((c, n, 3)), np.zeros((c, n, 3)))
 
 
 @njit
-def forward(body: Body, q: Array, frames: Frames) -> None:
-    """All joints at q (n,)."""
+def forward(body: Body, q: Array, frames: Frames, c: int) -> None:
+    """All joints at q (n,), which is configuration c of ``frames``."""
     for i in range(q.shape[0]):
-        _place_joint(body, q, frames, i)
+        _place_joint(body, q, frames, c, i)
 
 
 @njit
-def forward_to(body: Body, q: Array, joint: int, frames: Frames) -> None:
+def forward_to(body: Body, q: Array, joint: int, frames: Frames, c: int) -> None:
     """``joint`` at q (n,), and the joints between it and the base; the others keep what they had."""
     for i in range(joint + 1):
         if body.chain.moves[i, joint]:
-            _place_joint(body, q, frames, i)
+            _place_joint(body, q, frames, c, i)
 
 
 @njit
-def _place_joint(body: Body, q: Array, frames: Frames, i: int) -> None:
+def _place_joint(body: Body, q: Array, frames: Frames, c: int, i: int) -> None:
     chain = body.chain
     r, t = rot(chain.rotation, i), vec(chain.translation, i)
     parent = chain.parent[i]
     if parent >= 0:
-        parent_r = rot(frames.rotation, parent)
-        t = add(vec(frames.translation, parent), rotate(parent_r, t))
+        parent_r = rot(frames.rotation[c], parent)
+        t = add(vec(frames.translation[c], parent), rotate(parent_r, t))
         r = compose(parent_r, r)
     axis = vec(chain.axis, i)
     z = rotate(r, axis)
@@ -110,9 +123,9 @@ def _place_joint(body: Body, q: Array, frames: Frames, i: int) -> None:
         t = add(t, scale(q[i], z))
     else:
         r = compose(r, turn(axis, q[i]))
-    store_rot(frames.rotation, i, r)
-    store(frames.translation, i, t)
-    store(frames.axis, i, z)
+    store_rot(frames.rotation[c], i, r)
+    store(frames.translation[c], i, t)
+    store(frames.axis[c], i, z)
 
 
 @njit
@@ -128,22 +141,22 @@ def turn(k: Vec, angle: float) -> Rot:
 
 
 @njit
-def piece_pose(body: Body, frames: Frames, k: int) -> tuple[Rot, Vec]:
-    """Rotation and translation of piece k in the world; its joint must have been placed."""
+def piece_pose(body: Body, frames: Frames, c: int, k: int) -> tuple[Rot, Vec]:
+    """Rotation and translation of piece k in the world at configuration c; its joint must have been placed."""
     joint = body.joint[k]
-    r = rot(frames.rotation, joint)
-    t = add(vec(frames.translation, joint), rotate(r, vec(body.translation, k)))
+    r = rot(frames.rotation[c], joint)
+    t = add(vec(frames.translation[c], joint), rotate(r, vec(body.translation, k)))
     return compose(r, rot(body.rotation, k)), t
 
 
 @njit
-def gradient(body: Body, frames: Frames, joint: int, a: Vec, normal: Vec, out: Array) -> None:
+def gradient(body: Body, frames: Frames, c: int, joint: int, a: Vec, normal: Vec, out: Array) -> None:
     """∂d/∂q = -νᵀ J_a for a point ``a`` (world) of the body of ``joint``, into ``out`` (n,); ν is ``normal``."""
     chain = body.chain
     for i in range(out.shape[0]):
         if not chain.moves[i, joint]:
             out[i] = 0.0
         elif chain.prismatic[i]:
-            out[i] = -dot(normal, vec(frames.axis, i))
+            out[i] = -dot(normal, vec(frames.axis[c], i))
         else:
-            out[i] = -dot(normal, cross(vec(frames.axis, i), sub(a, vec(frames.translation, i))))
+            out[i] = -dot(normal, cross(vec(frames.axis[c], i), sub(a, vec(frames.translation[c], i))))

@@ -12,7 +12,6 @@ and ∂_q f / ||∂_q f|| and νᵀḃ / ||∂_q f|| take their place. The deriv
 from __future__ import annotations
 
 from math import sqrt
-from typing import NamedTuple
 
 import numpy as np
 
@@ -22,8 +21,9 @@ from cdfctl.fields.kernel.escape import Escape, escape_from, new_escape
 from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.parts import Parts, obstacle_pose, time_derivative
 from cdfctl.fields.kernel.projection import copy
-from cdfctl.fields.kernel.search import Memory, Search, add_start, nearest_contacts, new_search
+from cdfctl.fields.kernel.search import Memory, Search, nearest_contacts, new_search, pieces_at, place_at
 from cdfctl.fields.kernel.starts import Table, table_starts
+from cdfctl.fields.kernel.structs import Struct
 from cdfctl.fields.kernel.vec import Vec, add, rotate, vec, vec3
 from cdfctl.types import Array, BoolArray, IntArray
 
@@ -31,11 +31,11 @@ AT_CONTACT = 1e-3  # rad
 UNMOVED = 1e-6  # m/rad: a contact whose gradient over the free joints is shorter moves with no joint
 
 
-class ContactRows(NamedTuple):
+class ContactRows(Struct):
     """m obstacles of ``sheets`` rows each, and the signed distance of every link for those who want it too.
 
     Attributes:
-        filled: (m,) how many rows of an obstacle are filled.
+        filled: (m,) how many rows of an obstacle are filled. Where none is, the first says so: d = +inf, invalid.
         piece: (m, sheets); ``d``, ``dt``, ``valid`` (m, sheets); ``dq``, ``contact_q`` (m, sheets, n).
         f: (m,) least signed distance of the pieces at q, m.
     """
@@ -64,7 +64,7 @@ def new_contact_rows(m: int, sheets: int, n: int) -> ContactRows:
     )
 
 
-class Workspace(NamedTuple):
+class Workspace(Struct):
     """Everything a query writes to but its answer."""
 
     search: Search
@@ -83,22 +83,26 @@ def contact_rows(
     """Fill ``rows`` for all obstacles at q (n,)."""
     memory.turn[0] += 1
     found = work.search.found
-    pieces = body.joint.shape[0]
+    place_at(body, q, work.search)
     for o in range(parts.first.shape[0] - 1):
-        nearest = 0
-        for k in range(pieces):
-            add_start(body, q, parts, o, found, k, k, q, work.search.work)
-            if found.f[k] < found.f[nearest]:
-                nearest = k
+        nearest = pieces_at(body, q, parts, o, work.search)
         rows.f[o] = found.f[nearest]
         centre, size = _ball_around(parts, o, vec(found.b, nearest))
         if found.f[nearest] < 0.0:
             rows.filled[o] = _escape_row(body, q, parts, o, memory, table, centre, rows, work)
-            continue
-        count = nearest_contacts(body, q, parts, o, memory, table, centre, size, sheets, work.search)
-        rows.filled[o] = count
-        for i in range(count):
-            _fill(body, q, parts, o, work.search, work.search.chosen[i], rows, i)
+        else:
+            rows.filled[o] = nearest_contacts(body, q, parts, o, memory, table, centre, size, sheets, work.search)
+            for i in range(rows.filled[o]):
+                _fill(body, q, parts, o, work.search, work.search.choice.chosen[i], rows, i)
+        if rows.filled[o] == 0:
+            _leave_empty(rows, o)
+
+
+@njit
+def _leave_empty(rows: ContactRows, o: int) -> None:
+    rows.d[o, 0], rows.dt[o, 0], rows.valid[o, 0] = np.inf, 0.0, False
+    for j in range(rows.dq.shape[2]):
+        rows.dq[o, 0, j], rows.contact_q[o, 0, j] = 0.0, np.nan
 
 
 @njit

@@ -18,19 +18,20 @@ four times as often.
 from __future__ import annotations
 
 from math import sqrt
-from typing import NamedTuple
 
 import numpy as np
 
-from cdfctl.fields.kernel.body import Body, Frames, forward_to, gradient
-from cdfctl.fields.kernel.distance import Work
+from cdfctl.fields.kernel.body import Body, forward, forward_to, gradient, piece_pose
+from cdfctl.fields.kernel.candidates import Candidates
+from cdfctl.fields.kernel.distance import NO_CONTACT, Work, block_bound, relative_pose
 from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.parts import Parts
 from cdfctl.fields.kernel.projection import copy, project
 from cdfctl.fields.kernel.quadratic import Quadratic, new_quadratic, newton_direction
-from cdfctl.fields.kernel.rows import nearest_pair
-from cdfctl.fields.kernel.vec import cross, dot, store, sub, vec
-from cdfctl.types import Array, IntArray
+from cdfctl.fields.kernel.rows import nearest_in_block, nearest_pair
+from cdfctl.fields.kernel.structs import Struct
+from cdfctl.fields.kernel.vec import ZERO, cross, dot, store, sub, vec
+from cdfctl.types import Array
 
 FAR = 0.12  # rad of linearised distance to the surface, above which a step only restores
 LONGEST_RESTORATION = 1.0  # rad
@@ -42,40 +43,7 @@ AT_LIMIT = 1e-6  # rad: a joint nearer than this to a limit is at it
 STILL = 1e-9  # m/rad: no joint moves the contact
 
 
-class Candidates(NamedTuple):
-    """c candidate contacts between one obstacle and pieces of the robot, each with all that is known where it stands.
-
-    Attributes:
-        piece: (c,) the piece of the robot.
-        x: (c, n) configuration.
-        f: (c,) signed distance there, m; ``g`` (c, n) its gradient.
-        a, b, normal: (c, 3) witness points and normal in the world.
-        slope: (c,) norm of g over the joints not at a limit.
-        multiplier: (c,) λ, and ``residual`` (c,) the norm of z (c, n) = x - q + λ g over the joints free to move.
-        curvature: (c,) σ.
-        cost: (c,) rad: the distance from q, and the linearised distance still to go to the surface.
-        rotation, translation, axis: (c, n, 3, 3), (c, n, 3), (c, n, 3) the joints at x.
-    """
-
-    piece: IntArray
-    x: Array
-    f: Array
-    g: Array
-    a: Array
-    b: Array
-    normal: Array
-    slope: Array
-    multiplier: Array
-    residual: Array
-    z: Array
-    curvature: Array
-    cost: Array
-    rotation: Array
-    translation: Array
-    axis: Array
-
-
-class Scratch(NamedTuple):
+class Scratch(Struct):
     """Workspace of a step: ``B`` (n, n), ``J`` (n, 3) columns of the contact point, ``y``, ``z`` (n,), ``normal``."""
 
     B: Array
@@ -86,52 +54,29 @@ class Scratch(NamedTuple):
     quadratic: Quadratic
 
 
-def new_candidates(c: int, n: int) -> Candidates:
-    """Places for ``c`` candidates of ``n`` joints."""
-    return Candidates(
-        piece=np.zeros(c, dtype=np.int64),
-        x=np.zeros((c, n)),
-        f=np.zeros(c),
-        g=np.zeros((c, n)),
-        a=np.zeros((c, 3)),
-        b=np.zeros((c, 3)),
-        normal=np.zeros((c, 3)),
-        slope=np.zeros(c),
-        multiplier=np.zeros(c),
-        residual=np.zeros(c),
-        z=np.zeros((c, n)),
-        curvature=np.zeros(c),
-        cost=np.zeros(c),
-        rotation=np.zeros((c, n, 3, 3)),
-        translation=np.zeros((c, n, 3)),
-        axis=np.zeros((c, n, 3)),
-    )
-
-
 def new_scratch(n: int) -> Scratch:
     """A workspace for ``n`` joints."""
     return Scratch(np.zeros((n, n)), np.zeros((n, 3)), np.zeros(n), np.zeros(n), np.zeros(3), new_quadratic(n))
 
 
 @njit
-def frames_of(found: Candidates, c: int) -> Frames:
-    """The joints' placements kept with candidate c."""
-    return Frames(found.rotation[c], found.translation[c], found.axis[c])
+def evaluate(body: Body, q: Array, parts: Parts, o: int, found: Candidates, c: int, work: Work) -> None:
+    """Everything about candidate c at its ``x``, but for ``x`` and ``piece`` themselves."""
+    found.place[c] = c
+    forward_to(body, found.x[c], body.joint[found.piece[c]], found.frames, c)
+    evaluate_placed(body, q, parts, o, found, c, work)
 
 
 @njit
-def evaluate(body: Body, q: Array, parts: Parts, o: int, found: Candidates, c: int, work: Work) -> None:
-    """Everything about candidate c at its ``x``, but for ``x`` and ``piece`` themselves."""
-    k = found.piece[c]
-    joint = body.joint[k]
-    frames = frames_of(found, c)
-    forward_to(body, found.x[c], joint, frames)
-    _, contact = nearest_pair(body, frames, k, k + 1, parts, o, work)
+def evaluate_placed(body: Body, q: Array, parts: Parts, o: int, found: Candidates, c: int, work: Work) -> None:
+    """The same where the joints have been placed already."""
+    k, place = found.piece[c], found.place[c]
+    _, contact = nearest_pair(body, found.frames, place, k, k + 1, parts, o, work)
     found.f[c] = contact.d
     store(found.a, c, contact.a)
     store(found.b, c, contact.b)
     store(found.normal, c, contact.normal)
-    gradient(body, frames, joint, contact.a, contact.normal, found.g[c])
+    gradient(body, found.frames, place, body.joint[k], contact.a, contact.normal, found.g[c])
     measure(body, q, found, c)
 
 
@@ -162,13 +107,19 @@ def measure(body: Body, q: Array, found: Candidates, c: int) -> None:
 
 
 @njit
+def is_near(found: Candidates, c: int) -> bool:
+    """Whether candidate c is near enough to the surface for a step of more than restoration."""
+    return bool(abs(found.f[c]) <= FAR * found.slope[c])
+
+
+@njit
 def advance(
     body: Body, q: Array, parts: Parts, o: int, found: Candidates, c: int, scratch: Scratch, work: Work
 ) -> None:
     """One step of candidate c, as described above; it must have been evaluated, and is again."""
     lower, upper = body.chain.lower, body.chain.upper
     x, g, y = found.x[c], found.g[c], scratch.y
-    near = abs(found.f[c]) <= FAR * found.slope[c]
+    near = is_near(found, c)
     if not near:
         project(x, x, found.f[c], g, lower, upper, y)
         for j in range(y.shape[0]):
@@ -223,31 +174,32 @@ def learn_curvature(found: Candidates, c: int, multiplier: float, scratch: Scrat
 
 @njit
 def hessian(body: Body, found: Candidates, c: int, scratch: Scratch) -> None:
-    """B of the module's text, for candidate c."""
+    """B of the module's text, for candidate c, and which joints are still."""
     chain = body.chain
     joint = body.joint[found.piece[c]]
-    normal, a = vec(found.normal, c), vec(found.a, c)
+    axis, origin = found.frames.axis[found.place[c]], found.frames.translation[found.place[c]]
+    normal, a, g = vec(found.normal, c), vec(found.a, c), found.g[c]
     multiplier = max(0.0, found.multiplier[c])
+    sigma = multiplier * found.curvature[c]
     B, J = scratch.B, scratch.J
     for i in range(3):
         scratch.normal[i] = normal[i]
     for j in range(B.shape[0]):
-        if not chain.moves[j, joint]:
-            store(J, j, (0.0, 0.0, 0.0))
+        scratch.quadratic.still[j] = not chain.moves[j, joint]
+        if scratch.quadratic.still[j]:
+            J_j = ZERO
         elif chain.prismatic[j]:
-            store(J, j, vec(found.axis[c], j))
+            J_j = vec(axis, j)
         else:
-            store(J, j, cross(vec(found.axis[c], j), sub(a, vec(found.translation[c], j))))
-        J_j = vec(J, j)
-        along = dot(normal, J_j)
+            J_j = cross(vec(axis, j), sub(a, vec(origin, j)))
+        store(J, j, J_j)
+        across = cross(J_j, normal)  # ν·(z_i × J_j) = z_i·(J_j × ν)
         for i in range(j + 1):
-            J_i = vec(J, i)
-            tangential = dot(J_i, J_j) - dot(normal, J_i) * along
-            bend = 0.0
-            if chain.moves[i, j] and chain.moves[j, joint] and not chain.prismatic[i]:
-                bend = -dot(normal, cross(vec(found.axis[c], i), J_j))
-            B[i, j] = multiplier * (bend + found.curvature[c] * tangential)
-            B[j, i] = B[i, j]
+            value = sigma * (dot(vec(J, i), J_j) - g[i] * g[j])  # g = -νᵀJ
+            if chain.moves[i, j] and not chain.prismatic[i]:
+                value -= multiplier * dot(vec(axis, i), across)
+            B[i, j] = value
+            B[j, i] = value
         B[j, j] += 1.0
 
 
@@ -267,3 +219,26 @@ def restore(
         project(x, x, found.f[c], g, lower, upper, y)
         copy(y, x)
         evaluate(body, q, parts, o, found, c, work)
+
+
+@njit
+def penetrating_piece(
+    body: Body, parts: Parts, o: int, found: Candidates, c: int, tolerance: float, upstream: bool, work: Work
+) -> int:
+    """A piece other than that of candidate c that is deeper than ``tolerance`` (m) in obstacle o at its x, -1 for none.
+
+    If ``upstream``, only pieces count whose place follows from the joints that move the candidate's.
+    """
+    own = found.piece[c]
+    forward(body, found.x[c], found.frames, c)
+    for k in range(body.joint.shape[0]):
+        if k == own or (upstream and not body.chain.moves[body.joint[k], body.joint[own]]):
+            continue
+        r_a, t_a = piece_pose(body, found.frames, c, k)
+        r, t = relative_pose(r_a, t_a, parts, parts.first[o])
+        for block in range(parts.first_block[o], parts.first_block[o + 1]):
+            if block_bound(body, k, parts, block, r, t) < -tolerance:
+                _, contact = nearest_in_block(body, found.frames, c, k, parts, block, -1, NO_CONTACT, work)
+                if contact.d < -tolerance:
+                    return k
+    return -1

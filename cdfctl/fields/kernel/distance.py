@@ -9,6 +9,7 @@ b - a = d normal, and d grows by e when B moves by e along the normal.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -18,8 +19,10 @@ from cdfctl.fields.kernel.epa import Polytope, core_depth, new_polytope
 from cdfctl.fields.kernel.gjk import Simplex, core_distance, new_simplex
 from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.parts import Parts, obstacle_pose
-from cdfctl.fields.kernel.sets import ConvexSets
+from cdfctl.fields.kernel.sets import ConvexSets, pack
+from cdfctl.fields.kernel.structs import Struct, compiled
 from cdfctl.fields.kernel.vec import (
+    ZERO,
     Rot,
     Vec,
     add,
@@ -36,11 +39,15 @@ from cdfctl.fields.kernel.vec import (
 )
 
 
-class Work(NamedTuple):
-    """Workspace of the distance functions: one for each thread, nothing is kept between calls."""
+class Work(Struct):
+    """Workspace of the distance functions: one for each thread, nothing is kept between calls.
+
+    ``measure`` is :func:`_measure`, whose code is long and its callers many.
+    """
 
     simplex: Simplex
     polytope: Polytope
+    measure: Callable[[ConvexSets, int, ConvexSets, int, Rot, Vec, Vec, float, Simplex, Polytope], Contact]
 
 
 class Contact(NamedTuple):
@@ -75,15 +82,31 @@ def signed_distance(
     ``guess`` is a direction from A to B to start from: the normal of a like query, or zero for none. Where the distance
     exceeds ``cutoff`` (m), the answer may be any d that is above the cutoff and not above the distance.
     """
+    return work.measure(sets_a, i, sets_b, j, r, t, guess, cutoff, work.simplex, work.polytope)
+
+
+@njit
+def _measure(
+    sets_a: ConvexSets,
+    i: int,
+    sets_b: ConvexSets,
+    j: int,
+    r: Rot,
+    t: Vec,
+    guess: Vec,
+    cutoff: float,
+    simplex: Simplex,
+    polytope: Polytope,
+) -> Contact:
     r_a, r_b = sets_a.info[i].radius, sets_b.info[j].radius
     if not dot(guess, guess) > 0.0:
         guess = sub(add(rotate(r, vec3(sets_b.info[j].centre)), t), vec3(sets_a.info[i].centre))
     if not dot(guess, guess) > 0.0:
         guess = (0.0, 0.0, 1.0)
     core_cutoff = max(0.0, cutoff + r_a + r_b)
-    core = core_distance(sets_a, i, sets_b, j, r, t, guess, core_cutoff, work.simplex)
+    core = core_distance(sets_a, i, sets_b, j, r, t, guess, core_cutoff, simplex)
     if core.touching:
-        return _touching(sets_a, i, sets_b, j, r, t, core.a, core.v, work)
+        return _touching(sets_a, i, sets_b, j, r, t, core.a, core.v, polytope)
     normal = scale(-1.0 / norm(core.v), core.v)
     d = core.distance - r_a - r_b
     return Contact(d, along(core.a, r_a, normal), along(core.b, -r_b, normal), normal)
@@ -91,11 +114,11 @@ def signed_distance(
 
 @njit
 def _touching(
-    sets_a: ConvexSets, i: int, sets_b: ConvexSets, j: int, r: Rot, t: Vec, shared: Vec, v: Vec, work: Work
+    sets_a: ConvexSets, i: int, sets_b: ConvexSets, j: int, r: Rot, t: Vec, shared: Vec, v: Vec, polytope: Polytope
 ) -> Contact:
     """The contact of cores that touch (their nearest points ``v`` apart, or less than rounding) or overlap."""
     r_a, r_b = sets_a.info[i].radius, sets_b.info[j].radius
-    core = core_depth(sets_a, i, sets_b, j, r, t, work.polytope)
+    core = core_depth(sets_a, i, sets_b, j, r, t, polytope)
     a, depth, normal = core.a, core.depth, core.normal
     if core.flat:
         a, depth = shared, 0.0
@@ -105,14 +128,14 @@ def _touching(
 
 @njit
 def piece_distance(
-    body: Body, frames: Frames, k: int, parts: Parts, p: int, guess: Vec, cutoff: float, work: Work
+    body: Body, frames: Frames, c: int, k: int, parts: Parts, p: int, guess: Vec, cutoff: float, work: Work
 ) -> Contact:
-    """Piece k of the robot against part p of the obstacles, in the world.
+    """Piece k of the robot, at configuration c, against part p of the obstacles, in the world.
 
     The joint of the piece must have been placed (:func:`forward` or :func:`forward_to`). ``guess`` and ``cutoff`` are
     those of :func:`signed_distance`, the guess in the world.
     """
-    r_a, t_a = piece_pose(body, frames, k)
+    r_a, t_a = piece_pose(body, frames, c, k)
     r, t = relative_pose(r_a, t_a, parts, p)
     return to_world(r_a, t_a, signed_distance(body.sets, k, parts.sets, p, r, t, rotate_back(r_a, guess), cutoff, work))
 
@@ -159,7 +182,9 @@ def gap_to_ball(body: Body, k: int, c: Vec, reach: float, radius: float) -> floa
 
 def new_work() -> Work:
     """A workspace; about 150 kB."""
-    return Work(new_simplex(), new_polytope())
+    sets, simplex, polytope = pack([]), new_simplex(), new_polytope()
+    measure = compiled(_measure, sets, 0, sets, 0, (ZERO, ZERO, ZERO), ZERO, ZERO, 0.0, simplex, polytope)
+    return Work(simplex, polytope, measure)
 
 
 NO_CONTACT = Contact(np.inf, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

@@ -19,6 +19,7 @@ import numpy as np
 from cdfctl.fields.kernel.gjk import support_of_difference
 from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.sets import ConvexSets
+from cdfctl.fields.kernel.structs import Struct
 from cdfctl.fields.kernel.vec import Rot, Vec, cross, dot, norm, perpendicular, scale, sub, vec
 from cdfctl.types import Array, IntArray
 
@@ -29,7 +30,7 @@ GAP = 1e-11  # of the bounds, relative to the size of D
 COPLANAR = 1e-11  # a point nearer to a face's plane than this, relative to that size, lies in it
 
 
-class Polytope(NamedTuple):
+class Polytope(Struct):
     """Workspace of EPA.
 
     Attributes:

@@ -14,7 +14,6 @@ which is the formula of one contact where only one multiplier is positive.
 from __future__ import annotations
 
 from math import sqrt
-from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +23,7 @@ from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.parts import Parts, time_derivative
 from cdfctl.fields.kernel.projection import project
 from cdfctl.fields.kernel.rows import nearest_pair
+from cdfctl.fields.kernel.structs import Struct
 from cdfctl.types import Array
 
 STEPS = 40
@@ -33,7 +33,7 @@ TOUCH = 5e-5  # m
 SETTLED = 1e-6  # rad
 
 
-class Escape(NamedTuple):
+class Escape(Struct):
     """Workspace: ``x``, ``y``, ``target`` (n,), per piece ``f``, ``dt``, ``mu`` (k,), ``g`` (k, n), and the joints."""
 
     x: Array
@@ -85,13 +85,13 @@ def escape_from(body: Body, q: Array, parts: Parts, o: int, escape: Escape, work
 @njit
 def linearise(body: Body, parts: Parts, o: int, escape: Escape, work: Work) -> float:
     """f, g and ∂f/∂t of every piece at ``escape.x``; the least f."""
-    forward(body, escape.x, escape.frames)
+    forward(body, escape.x, escape.frames, 0)
     least = np.inf
     for k in range(escape.f.shape[0]):
-        _, contact = nearest_pair(body, escape.frames, k, k + 1, parts, o, work)
+        _, contact = nearest_pair(body, escape.frames, 0, k, k + 1, parts, o, work)
         escape.f[k] = contact.d
         escape.dt[k] = time_derivative(parts, o, contact.b, contact.normal)
-        gradient(body, escape.frames, body.joint[k], contact.a, contact.normal, escape.g[k])
+        gradient(body, escape.frames, 0, body.joint[k], contact.a, contact.normal, escape.g[k])
         least = min(least, contact.d)
     return least
 

@@ -19,6 +19,7 @@ import numpy as np
 from cdfctl.fields.kernel.jit import njit, njit_inline
 from cdfctl.fields.kernel.sets import ConvexSets, support
 from cdfctl.fields.kernel.simplex import nearest_on_segment, nearest_on_tetrahedron, nearest_on_triangle
+from cdfctl.fields.kernel.structs import Struct
 from cdfctl.fields.kernel.vec import ZERO, Rot, Vec, add, along, dot, rotate, rotate_back, scale, sub
 from cdfctl.types import Array
 
@@ -27,7 +28,7 @@ GAP = 1e-15  # relative gap of the bounds, and the rounding of a coordinate of s
 TOUCH = 1e-10  # cores nearer than this, relative to their size, count as touching: EPA finds the normal
 
 
-class Simplex(NamedTuple):
+class Simplex(Struct):
     """Workspace of GJK: the points of D, and the points of A they come from. (4, 3) each."""
 
     w: Array

@@ -12,8 +12,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import os
 import platform
+import shutil
+import time
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -25,6 +29,9 @@ from cdfctl.cache import cache_dir, writable_dir
 
 P = ParamSpec("P")
 T = TypeVar("T")
+
+KEPT = 4  # folders of machine code, each some 20 MB
+DAY = 86400.0  # s
 
 OPTIONS: dict[str, Any] = {
     "nogil": True,
@@ -78,7 +85,21 @@ def _plain_integers(compiled: Any) -> Any:
 
 @cache
 def _kernel_cache() -> Path | None:
+    """The folder of the machine code of these sources. Those of other sources go, but for the last few used."""
     digest = hashlib.sha256(f"{numba.__version__} {platform.python_version()}".encode())
     for source in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(source.read_bytes())
-    return writable_dir(cache_dir() / "kernels" / digest.hexdigest()[:16])
+    folder = writable_dir(cache_dir() / "kernels" / digest.hexdigest()[:16])
+    if folder is not None:
+        with contextlib.suppress(OSError):
+            os.utime(folder)
+            _forget_old(folder.parent)
+    return folder
+
+
+def _forget_old(kernels: Path) -> None:
+    """Remove all but the newest folders; one used within a day may be in use still, and stays."""
+    used = sorted(((folder.stat().st_mtime, folder) for folder in kernels.glob("[0-9a-f]" * 16)), reverse=True)
+    for when, folder in used[KEPT:]:
+        if time.time() - when > DAY:
+            shutil.rmtree(folder, ignore_errors=True)

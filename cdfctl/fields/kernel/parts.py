@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from cdfctl.errors import InputError
 from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.sets import ConvexSets, Records, pack
+from cdfctl.fields.kernel.structs import Struct
 from cdfctl.fields.kernel.vec import Rot, Vec, add, cross, dot, rot, store_rot, sub, vec
 from cdfctl.robots.convex import ConvexSet, convex_sets
 from cdfctl.types import Array, IntArray, Scene, Shape
@@ -29,7 +28,7 @@ BLOCK = np.dtype((np.record, _BLOCK))
 """Some parts of one obstacle that lie together."""
 
 
-class Parts(NamedTuple):
+class Parts(Struct):
     """m obstacles of p convex parts. Only the poses and twists change from step to step.
 
     Attributes:

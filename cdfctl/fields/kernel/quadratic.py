@@ -10,28 +10,35 @@ not positive definite on the free joints, multiples of the identity are added un
 from __future__ import annotations
 
 from math import sqrt
-from typing import NamedTuple
 
 import numpy as np
 
 from cdfctl.fields.kernel.jit import njit
+from cdfctl.fields.kernel.structs import Struct
 from cdfctl.types import Array, BoolArray, IntArray
 
 
-class Quadratic(NamedTuple):
-    """Workspace: ``L`` (n, n) Cholesky factor, ``v``, ``w`` (n,) B⁻¹ (q - x) and B⁻¹ g, ``free`` (n,), ``fixed``."""
+class Quadratic(Struct):
+    """Workspace: ``L`` (n, n) Cholesky factor, its diagonal inverted; ``v``, ``w`` (n,) B⁻¹ (q - x) and B⁻¹ g; ``free``
+    (n,), ``fixed``. Joints that are ``still`` (n,) when the solver is called do not move."""
 
     L: Array
     v: Array
     w: Array
     free: IntArray
     fixed: BoolArray
+    still: BoolArray
 
 
 def new_quadratic(n: int) -> Quadratic:
     """A workspace for ``n`` joints."""
     return Quadratic(
-        np.zeros((n, n)), np.zeros(n), np.zeros(n), np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
+        np.zeros((n, n)),
+        np.zeros(n),
+        np.zeros(n),
+        np.zeros(n, dtype=np.int64),
+        np.zeros(n, dtype=np.bool_),
+        np.zeros(n, dtype=np.bool_),
     )
 
 
@@ -41,8 +48,8 @@ def newton_direction(
 ) -> None:
     """Write the minimiser into ``d`` (n,). ``B`` (n, n) may be changed on its diagonal."""
     n = x.shape[0]
-    work.fixed[:] = False
-    d[:] = 0.0
+    for j in range(n):
+        work.fixed[j], d[j] = work.still[j], 0.0
     for _ in range(n):
         m, level = 0, -f
         for j in range(n):
@@ -65,8 +72,7 @@ def newton_direction(
                 if work.fixed[k]:
                     pull -= B[j, k] * d[k]
             work.v[i], work.w[i] = pull, g[j]
-        _solve(work.L, m, work.v)
-        _solve(work.L, m, work.w)
+        _solve(work.L, m, work.v, work.w)
         gv, gw = 0.0, 0.0
         for i in range(m):
             gv += g[work.free[i]] * work.v[i]
@@ -86,29 +92,38 @@ def newton_direction(
 
 @njit
 def _factor(B: Array, free: IntArray, m: int, L: Array) -> bool:
-    """Cholesky factor of B on the ``m`` free joints; False where it is not positive definite there."""
+    """Cholesky factor of B on the ``m`` free joints; False where it is not positive definite there.
+
+    The diagonal of L holds the inverses, since all that follows divides by it.
+    """
     for i in range(m):
-        for j in range(i + 1):
-            value = B[free[i], free[j]]
+        row = free[i]
+        for j in range(i):
+            value = B[row, free[j]]
             for k in range(j):
                 value -= L[i, k] * L[j, k]
-            if i == j:
-                if not value > 1e-9:
-                    return False
-                L[i, i] = sqrt(value)
-            else:
-                L[i, j] = value / L[j, j]
+            L[i, j] = value * L[j, j]
+        value = B[row, row]
+        for k in range(i):
+            value -= L[i, k] * L[i, k]
+        if not value > 1e-9:
+            return False
+        L[i, i] = 1.0 / sqrt(value)
     return True
 
 
 @njit
-def _solve(L: Array, m: int, b: Array) -> None:
-    """L Lᵀ x = b, x in place of b."""
+def _solve(L: Array, m: int, b: Array, c: Array) -> None:
+    """L Lᵀ x = b and L Lᵀ y = c, x in place of b and y in place of c."""
     for i in range(m):
+        b_i, c_i = b[i], c[i]
         for k in range(i):
-            b[i] -= L[i, k] * b[k]
-        b[i] /= L[i, i]
+            b_i -= L[i, k] * b[k]
+            c_i -= L[i, k] * c[k]
+        b[i], c[i] = b_i * L[i, i], c_i * L[i, i]
     for i in range(m - 1, -1, -1):
+        b_i, c_i = b[i], c[i]
         for k in range(i + 1, m):
-            b[i] -= L[k, i] * b[k]
-        b[i] /= L[i, i]
+            b_i -= L[k, i] * b[k]
+            c_i -= L[k, i] * c[k]
+        b[i], c[i] = b_i * L[i, i], c_i * L[i, i]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,13 +19,14 @@ from cdfctl.fields.kernel.distance import (
 )
 from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.parts import Parts, time_derivative
+from cdfctl.fields.kernel.structs import Struct
 from cdfctl.fields.kernel.vec import ZERO, store
 from cdfctl.types import Array, BoolArray, IntArray
 
 STILL = 1e-9  # a gradient shorter than this, m/rad or m/m, means that no joint can change the distance
 
 
-class Answer(NamedTuple):
+class Answer(Struct):
     """r rows to fill: ``link`` (r,), ``d`` (r,), ``dq`` (r, n), ``dt`` (r,), ``valid`` (r,), and the witness points
     ``a`` on the robot, ``b`` on the obstacle and the unit ``normal`` between them, (r, 3), all in the world."""
 
@@ -57,38 +57,40 @@ def new_answer(r: int, n: int) -> Answer:
 @njit
 def nearest_rows(body: Body, q: Array, parts: Parts, frames: Frames, work: Work, answer: Answer) -> None:
     """One row an obstacle: the nearest of all links."""
-    forward(body, q, frames)
+    forward(body, q, frames, 0)
     for o in range(parts.first.shape[0] - 1):
-        k, contact = nearest_pair(body, frames, 0, body.joint.shape[0], parts, o, work)
+        k, contact = nearest_pair(body, frames, 0, 0, body.joint.shape[0], parts, o, work)
         _fill(body, frames, parts, o, k, contact, answer, o)
 
 
 @njit
 def link_rows(body: Body, q: Array, parts: Parts, frames: Frames, work: Work, answer: Answer) -> None:
     """One row for each obstacle and link, the links of the first obstacle first."""
-    forward(body, q, frames)
+    forward(body, q, frames, 0)
     row = 0
     for o in range(parts.first.shape[0] - 1):
         for link in range(body.first.shape[0] - 1):
-            k, contact = nearest_pair(body, frames, body.first[link], body.first[link + 1], parts, o, work)
+            k, contact = nearest_pair(body, frames, 0, body.first[link], body.first[link + 1], parts, o, work)
             _fill(body, frames, parts, o, k, contact, answer, row)
             row += 1
 
 
 @njit
 def nearest_pair(
-    body: Body, frames: Frames, first: int, last: int, parts: Parts, o: int, work: Work
+    body: Body, frames: Frames, c: int, first: int, last: int, parts: Parts, o: int, work: Work
 ) -> tuple[int, Contact]:
     """The piece among ``first`` … ``last`` - 1 nearest to obstacle o, and the contact; (-1, no contact) for none.
+
+    The robot is at configuration c of ``frames``.
 
     The block of parts with the least lower bound is measured first, then every one whose bound is below the best.
     """
     start_k, start_block, least = -1, -1, np.inf
     first_block, last_block = parts.first_block[o], parts.first_block[o + 1]
     if (last - first) * (last_block - first_block) == 1:
-        return nearest_in_block(body, frames, first, parts, first_block, -1, NO_CONTACT, work)
+        return nearest_in_block(body, frames, c, first, parts, first_block, -1, NO_CONTACT, work)
     for k in range(first, last):
-        r_a, t_a = piece_pose(body, frames, k)
+        r_a, t_a = piece_pose(body, frames, c, k)
         r, t = relative_pose(r_a, t_a, parts, parts.first[o])
         for block in range(first_block, last_block):
             bound = block_bound(body, k, parts, block, r, t)
@@ -96,30 +98,30 @@ def nearest_pair(
                 start_k, start_block, least = k, block, bound
     if start_k < 0:
         return -1, NO_CONTACT
-    best_k, best = nearest_in_block(body, frames, start_k, parts, start_block, -1, NO_CONTACT, work)
+    best_k, best = nearest_in_block(body, frames, c, start_k, parts, start_block, -1, NO_CONTACT, work)
     for k in range(first, last):
-        r_a, t_a = piece_pose(body, frames, k)
+        r_a, t_a = piece_pose(body, frames, c, k)
         r, t = relative_pose(r_a, t_a, parts, parts.first[o])
         for block in range(first_block, last_block):
             if block_bound(body, k, parts, block, r, t) < best.d and not (k == start_k and block == start_block):
-                best_k, best = nearest_in_block(body, frames, k, parts, block, best_k, best, work)
+                best_k, best = nearest_in_block(body, frames, c, k, parts, block, best_k, best, work)
     return best_k, best
 
 
 @njit
 def nearest_in_block(
-    body: Body, frames: Frames, k: int, parts: Parts, block: int, best_k: int, best: Contact, work: Work
+    body: Body, frames: Frames, c: int, k: int, parts: Parts, block: int, best_k: int, best: Contact, work: Work
 ) -> tuple[int, Contact]:
     """Piece k and the part of a block nearest to it, if that is nearer than ``best``; else ``best`` of ``best_k``."""
-    r_a, t_a = piece_pose(body, frames, k)
+    r_a, t_a = piece_pose(body, frames, c, k)
     bounds = parts.block[block]
     r, t = relative_pose(r_a, t_a, parts, bounds.first)
     alone = bounds.last - bounds.first == 1
     for p in range(bounds.first, bounds.last):
         if alone or lower_bound(body, k, parts, p, r, t) < best.d:
-            c = signed_distance(body.sets, k, parts.sets, p, r, t, ZERO, best.d, work)
-            if c.d < best.d or best_k < 0:
-                best_k, best = k, to_world(r_a, t_a, c)
+            contact = signed_distance(body.sets, k, parts.sets, p, r, t, ZERO, best.d, work)
+            if contact.d < best.d or best_k < 0:
+                best_k, best = k, to_world(r_a, t_a, contact)
     return best_k, best
 
 
@@ -136,7 +138,7 @@ def _fill(body: Body, frames: Frames, parts: Parts, o: int, k: int, contact: Con
         return
     answer.link[row] = body.link[k]
     answer.dt[row] = time_derivative(parts, o, contact.b, contact.normal)
-    gradient(body, frames, body.joint[k], contact.a, contact.normal, dq)
+    gradient(body, frames, 0, body.joint[k], contact.a, contact.normal, dq)
     length2 = 0.0
     for i in range(dq.shape[0]):
         length2 += dq[i] * dq[i]

@@ -17,12 +17,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import sqrt
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cdfctl.fields.kernel.jit import njit_inline
+from cdfctl.fields.kernel.structs import Struct
 from cdfctl.fields.kernel.vec import Vec
 from cdfctl.types import Array, IntArray
 
@@ -50,7 +51,7 @@ INFO = np.dtype((np.record, _INFO))
 """What is known of one set. A record, not an array for each: few arguments keep calls and their compilation short."""
 
 
-class ConvexSets(NamedTuple):
+class ConvexSets(Struct):
     """k convex sets over V vertices, E directed edges.
 
     Attributes:

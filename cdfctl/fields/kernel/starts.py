@@ -11,17 +11,31 @@ to q as the limits allow, and joints that do not move the touching piece are tak
 from __future__ import annotations
 
 from math import atan2, floor, pi, sqrt
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cdfctl.fields.kernel.body import Body, Frames, forward, new_frames, piece_pose
-from cdfctl.fields.kernel.distance import block_bound, relative_pose
+from cdfctl.fields.kernel.distance import gap_to_ball
 from cdfctl.fields.kernel.jit import njit
-from cdfctl.fields.kernel.parts import Parts
 from cdfctl.fields.kernel.projection import copy
-from cdfctl.fields.kernel.vec import Vec, add, along, cross, dot, norm, rot, rotate, store, store_rot, sub, vec, vec3
+from cdfctl.fields.kernel.structs import Struct
+from cdfctl.fields.kernel.vec import (
+    Vec,
+    add,
+    along,
+    cross,
+    dot,
+    norm,
+    rot,
+    rotate,
+    rotate_back,
+    store,
+    store_rot,
+    sub,
+    vec,
+    vec3,
+)
 from cdfctl.types import Array, IntArray
 
 SAMPLED_PIECES = 1200  # samples times pieces: about 30 µs to go through
@@ -29,7 +43,7 @@ SPACING = 0.3  # rad between starts of one piece
 REACH = 0.5  # m/rad: how fast a piece moves, to weigh a gap in metres against an angle; only ranks starts
 
 
-class Table(NamedTuple):
+class Table(Struct):
     """Contact configurations on a grid of points; empty without a table.
 
     Attributes:
@@ -61,7 +75,7 @@ def empty_table(n: int) -> Table:
     )
 
 
-class Samples(NamedTuple):
+class Samples(Struct):
     """s configurations spread over the limits and where the k pieces are there.
 
     Attributes:
@@ -83,7 +97,7 @@ def spread_samples(body: Body) -> Samples:
     lower = np.where(np.isfinite(body.chain.lower), body.chain.lower, -half)
     upper = np.where(np.isfinite(body.chain.upper), body.chain.upper, half)
     s = -(-SAMPLED_PIECES // max(k, 1))
-    q = lower + qmc.Halton(n, scramble=False).random(s) * (upper - lower)
+    q = np.ascontiguousarray(lower + qmc.Halton(n, scramble=False).random(s) * (upper - lower))
     samples = Samples(q, np.zeros((s, k, 3, 3)), np.zeros((s, k, 3)))
     place_samples(body, samples, new_frames(body))
     return samples
@@ -93,51 +107,52 @@ def spread_samples(body: Body) -> Samples:
 def place_samples(body: Body, samples: Samples, frames: Frames) -> None:
     """Fill in where the pieces are at every sample."""
     for i in range(samples.q.shape[0]):
-        forward(body, samples.q[i], frames)
+        forward(body, samples.q[i], frames, 0)
         for k in range(body.joint.shape[0]):
-            r, t = piece_pose(body, frames, k)
+            r, t = piece_pose(body, frames, 0, k)
             store_rot(samples.rotation[i], k, r)
             store(samples.translation[i], k, t)
 
 
 @njit
-def sample_starts(body: Body, q: Array, parts: Parts, o: int, samples: Samples, starts: Starts) -> int:
-    """The samples nearest to q and to contact with obstacle o; how many starts there are."""
+def sample_starts(body: Body, q: Array, p: Vec, size: float, samples: Samples, starts: Starts) -> int:
+    """The samples nearest to q and to contact with a ball of radius ``size`` around ``p``; how many there are."""
     chain = body.chain
     count = 0
     for i in range(samples.q.shape[0]):
+        for j in range(q.shape[0]):
+            starts.turned[j] = _turned(body, samples.q[i, j], j, q)
         for k in range(body.joint.shape[0]):
-            r_a, t_a = rot(samples.rotation[i], k), vec(samples.translation[i], k)
-            r, t = relative_pose(r_a, t_a, parts, parts.first[o])
-            gap = np.inf
-            for block in range(parts.first_block[o], parts.first_block[o + 1]):
-                gap = min(gap, block_bound(body, k, parts, block, r, t))
+            here = rotate_back(rot(samples.rotation[i], k), sub(p, vec(samples.translation[i], k)))
+            cost = max(0.0, gap_to_ball(body, k, here, size, 0.0)) / REACH
+            if not wanted(starts, count, cost):
+                continue
             distance2 = 0.0
             for j in range(q.shape[0]):
                 if chain.moves[j, body.joint[k]]:
-                    distance2 += (_turned(body, samples.q[i, j], j, q) - q[j]) ** 2
-            cost = sqrt(distance2) + max(0.0, gap) / REACH
+                    distance2 += (starts.turned[j] - q[j]) ** 2
+            cost += sqrt(distance2)
             if wanted(starts, count, cost):
                 for j in range(q.shape[0]):
-                    moved = chain.moves[j, body.joint[k]]
-                    starts.offer[j] = _turned(body, samples.q[i, j], j, q) if moved else q[j]
+                    starts.offer[j] = starts.turned[j] if chain.moves[j, body.joint[k]] else q[j]
                 count = keep_offer(starts, count, k, cost)
     return count
 
 
-class Starts(NamedTuple):
+class Starts(Struct):
     """Workspace: the best starts found so far: ``piece`` (s,), ``x`` (s, n), ``cost`` (s,), least first; ``offer`` (n,)
-    is the one to be kept or not."""
+    is the one to be kept or not, ``turned`` (n,) a configuration by whole turns as near to q as can be."""
 
     piece: IntArray
     x: Array
     cost: Array
     offer: Array
+    turned: Array
 
 
 def new_starts(s: int, n: int) -> Starts:
     """Places for ``s`` starts."""
-    return Starts(np.zeros(s, dtype=np.int64), np.zeros((s, n)), np.zeros(s), np.zeros(n))
+    return Starts(np.zeros(s, dtype=np.int64), np.zeros((s, n)), np.zeros(s), np.zeros(n), np.zeros(n))
 
 
 @njit
@@ -186,21 +201,22 @@ def keep_offer(starts: Starts, count: int, piece: int, cost: float) -> int:
 
 
 @njit
-def swing_starts(body: Body, q: Array, frames: Frames, p: Vec, size: float, starts: Starts) -> int:
+def swing_starts(body: Body, q: Array, frames: Frames, place: int, p: Vec, size: float, starts: Starts) -> int:
     """Turns of one joint that bring the middle of a piece up to a ball of radius ``size`` around ``p``; how many.
 
     A turn of joint j carries the middle c of a piece around the joint's axis; it is nearest to p where both lie in one
-    half-plane through the axis, and meets the ball a little before. All joints must have been placed at q.
+    half-plane through the axis, and meets the ball a little before. The joints at q are at
+    ``place`` of ``frames``.
     """
     chain = body.chain
     count = 0
     for k in range(body.joint.shape[0]):
-        r, t = piece_pose(body, frames, k)
+        r, t = piece_pose(body, frames, place, k)
         c = add(rotate(r, vec3(body.sets.info[k].centre)), t)
         for j in range(q.shape[0]):
             if not chain.moves[j, body.joint[k]] or chain.prismatic[j]:
                 continue
-            z, o = vec(frames.axis, j), vec(frames.translation, j)
+            z, o = vec(frames.axis[place], j), vec(frames.translation[place], j)
             from_c, from_p = sub(c, o), sub(p, o)
             height_c, height_p = dot(z, from_c), dot(z, from_p)
             across_c, across_p = along(from_c, -height_c, z), along(from_p, -height_p, z)
@@ -224,16 +240,30 @@ def swing_starts(body: Body, q: Array, frames: Frames, p: Vec, size: float, star
 
 @njit
 def table_starts(body: Body, q: Array, table: Table, p: Vec, starts: Starts) -> int:
-    """The entries of the grid point nearest to ``p`` that are nearest to q; how many starts there are."""
-    count = 0
+    """The entries of the grid point nearest to ``p`` that are nearest to q; how many starts there are.
+
+    Where that point has none, at the rim of the reach, those of the points around it.
+    """
     if table.piece.shape[0] == 0:
+        return 0
+    x = floor((p[0] - table.origin[0]) / table.spacing + 0.5)
+    y = floor((p[1] - table.origin[1]) / table.spacing + 0.5)
+    z = floor((p[2] - table.origin[2]) / table.spacing + 0.5)
+    count = _point_starts(body, q, table, x, y, z, starts, 0)
+    if count == 0:
+        for i in range(x - 1, x + 2):
+            for j in range(y - 1, y + 2):
+                for k in range(z - 1, z + 2):
+                    count = _point_starts(body, q, table, i, j, k, starts, count)
+    return count
+
+
+@njit
+def _point_starts(body: Body, q: Array, table: Table, x: int, y: int, z: int, starts: Starts, count: int) -> int:
+    """The entries of one grid point, beside the ``count`` starts there are; how many then."""
+    if not (0 <= x < table.shape[0] and 0 <= y < table.shape[1] and 0 <= z < table.shape[2]):
         return count
-    index = 0
-    for axis in range(3):
-        i = floor((p[axis] - table.origin[axis]) / table.spacing + 0.5)
-        if i < -1 or i > table.shape[axis]:
-            return count  # out of reach, but for the rim
-        index = index * table.shape[axis] + min(max(i, 0), table.shape[axis] - 1)
+    index = (x * table.shape[1] + y) * table.shape[2] + z
     chain = body.chain
     n = q.shape[0]
     for e in range(table.first[index], table.first[index + 1]):

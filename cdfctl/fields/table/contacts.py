@@ -8,17 +8,17 @@ is for. Of what was found for a piece at most ``most`` are kept, each as far as 
 from __future__ import annotations
 
 from math import floor, pi, sqrt
-from typing import NamedTuple
 
 import numpy as np
 
-from cdfctl.fields.kernel.body import Body, forward_to
-from cdfctl.fields.kernel.contact import STILL, Candidates, evaluate, frames_of, new_candidates
-from cdfctl.fields.kernel.distance import Work, new_work, piece_distance
+from cdfctl.fields.kernel.body import Body
+from cdfctl.fields.kernel.candidates import Candidates, new_candidates
+from cdfctl.fields.kernel.contact import STILL, evaluate, penetrating_piece
+from cdfctl.fields.kernel.distance import Work, new_work
 from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.parts import Parts, parts_of
 from cdfctl.fields.kernel.projection import copy, project
-from cdfctl.fields.kernel.vec import ZERO
+from cdfctl.fields.kernel.structs import Struct
 from cdfctl.types import Array, IntArray, Sphere
 
 LANDED = 1e-5  # m: greatest |f| of an entry as it is found; single precision, as it is stored, adds about 1e-7
@@ -29,7 +29,7 @@ ALIKE = 0.02  # rad: of contacts nearer than this to each other one is kept
 HOPELESS = 3  # the share, one in so many, of all starts without a contact after which a piece is given up
 
 
-class Tools(NamedTuple):
+class Tools(Struct):
     """Workspace, one a thread: one candidate, a step, what was found (s, n), how far each is from those kept (s,)."""
 
     parts: Parts
@@ -44,7 +44,7 @@ def new_tools(body: Body, radius: float, starts: int) -> Tools:
     """A workspace for a ball of ``radius`` m and ``starts`` starts a piece."""
     n = len(body.chain.parent)
     parts = parts_of((Sphere(radius),))
-    return Tools(parts, new_candidates(1, n), np.zeros(n), np.zeros((starts, n)), np.zeros(starts), new_work())
+    return Tools(parts, new_candidates(body, 1), np.zeros(n), np.zeros((starts, n)), np.zeros(starts), new_work())
 
 
 @njit
@@ -71,7 +71,7 @@ def point_contacts(
         for s in range(total):
             if landed >= CROWD * most or (landed == 0 and HOPELESS * s >= total):
                 break
-            if land(body, k, starts[k, s], tools) and not (clear and blocked(body, k, tools)):
+            if land(body, k, starts[k, s], tools) and not (clear and blocked(body, tools)):
                 copy(tools.found.x[0], tools.pool[landed])
                 landed += 1
         count[k] = spread(body, k, landed, tools, contacts[k])
@@ -106,17 +106,9 @@ def land(body: Body, k: int, start: Array, tools: Tools) -> bool:
 
 
 @njit
-def blocked(body: Body, k: int, tools: Tools) -> bool:
-    """Whether another piece is in penetration at the place of ``tools.found``, as far as piece k's joints decide it."""
-    found = tools.found
-    frames = frames_of(found, 0)
-    for other in range(body.joint.shape[0]):
-        joint = body.joint[other]
-        if other != k and body.chain.moves[joint, body.joint[k]]:
-            forward_to(body, found.x[0], joint, frames)
-            if piece_distance(body, frames, other, tools.parts, 0, ZERO, 0.0, tools.work).d < -LANDED:
-                return True
-    return False
+def blocked(body: Body, tools: Tools) -> bool:
+    """Whether another piece is in penetration at the place of ``tools.found``, as far as its joints decide it."""
+    return penetrating_piece(body, tools.parts, 0, tools.found, 0, LANDED, True, tools.work) >= 0
 
 
 @njit

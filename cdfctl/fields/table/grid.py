@@ -62,9 +62,9 @@ def reach_box(body: Body) -> tuple[Array, Array]:
     frames = new_frames(body)
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for q in draws:
-        forward(body, q, frames)
-        world = np.einsum("kij,kcj->kci", frames.rotation[body.joint], corners)
-        world += frames.translation[body.joint][:, None, :]
+        forward(body, q, frames, 0)
+        world = np.einsum("kij,kcj->kci", frames.rotation[0, body.joint], corners)
+        world += frames.translation[0, body.joint][:, None, :]
         low, high = np.minimum(low, world.min(axis=(0, 1))), np.maximum(high, world.max(axis=(0, 1)))
     return low, high
 

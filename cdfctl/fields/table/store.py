@@ -68,7 +68,7 @@ def save_table(path: Path, robot: Robot, table: Table, parameters: BuildParamete
     Raises:
         InputError: it cannot be written.
     """
-    arrays: dict[str, NDArray[Any]] = {**table._asdict(), "spacing": np.array([table.spacing])}
+    arrays: dict[str, NDArray[Any]] = {**table.members(), "spacing": np.array([table.spacing])}
     metadata = {
         "kind": KIND,
         "format": str(FORMAT),

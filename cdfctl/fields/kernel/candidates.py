@@ -1,0 +1,151 @@
+"""Candidates for the nearest contact of one obstacle, and which of them to keep."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdfctl.fields.kernel.body import Body, Frames, new_frames
+from cdfctl.fields.kernel.jit import njit
+from cdfctl.fields.kernel.structs import Struct
+from cdfctl.types import Array, BoolArray, IntArray
+
+ALIKE = 0.05  # rad: candidates of one piece nearer than this are one
+DISTINCT = 0.1  # rad: contacts nearer than this to a nearer one are not told apart
+
+
+class Candidates(Struct):
+    """c candidate contacts between one obstacle and pieces of the robot, each with all that is known where it stands.
+
+    Attributes:
+        piece: (c,) the piece of the robot.
+        x: (c, n) configuration.
+        f: (c,) signed distance there, m; ``g`` (c, n) its gradient.
+        a, b, normal: (c, 3) witness points and normal in the world.
+        slope: (c,) norm of g over the joints not at a limit.
+        multiplier: (c,) λ, and ``residual`` (c,) the norm of z (c, n) = x - q + λ g over the joints free to move.
+        curvature: (c,) σ.
+        cost: (c,) rad: the distance from q, and the linearised distance still to go to the surface.
+        frames: where the joints are, in the ``place`` (c,) of each candidate: its own, or the last, the joints at q.
+    """
+
+    piece: IntArray
+    x: Array
+    f: Array
+    g: Array
+    a: Array
+    b: Array
+    normal: Array
+    slope: Array
+    multiplier: Array
+    residual: Array
+    z: Array
+    curvature: Array
+    cost: Array
+    place: IntArray
+    frames: Frames
+
+
+class Choice(Struct):
+    """Workspace: ``chosen`` (c,) are the candidates that go on, best first; ``marked`` (c,) those dealt with."""
+
+    chosen: IntArray
+    marked: BoolArray
+
+
+def new_candidates(body: Body, c: int) -> Candidates:
+    """Places for ``c`` candidates."""
+    n = len(body.chain.parent)
+    return Candidates(
+        piece=np.zeros(c, dtype=np.int64),
+        x=np.zeros((c, n)),
+        f=np.zeros(c),
+        g=np.zeros((c, n)),
+        a=np.zeros((c, 3)),
+        b=np.zeros((c, 3)),
+        normal=np.zeros((c, 3)),
+        slope=np.zeros(c),
+        multiplier=np.zeros(c),
+        residual=np.zeros(c),
+        z=np.zeros((c, n)),
+        curvature=np.zeros(c),
+        cost=np.zeros(c),
+        place=np.zeros(c, dtype=np.int64),
+        frames=new_frames(body, c + 1),
+    )
+
+
+def new_choice(c: int) -> Choice:
+    """A choice among ``c`` candidates."""
+    return Choice(np.zeros(c, dtype=np.int64), np.zeros(c, dtype=np.bool_))
+
+
+@njit
+def choose(found: Candidates, count: int, most: int, choice: Choice) -> int:
+    """Up to ``most`` of the first ``count`` candidates of least cost into ``choice.chosen``; how many.
+
+    One nearer than :data:`ALIKE` to a better one of the same piece is passed over.
+    """
+    return _select(found, count, most, ALIKE, True, choice)
+
+
+@njit
+def choose_distinct(found: Candidates, count: int, most: int, choice: Choice) -> int:
+    """As :func:`choose`, passing over those nearer than :data:`DISTINCT` to a better one of any piece."""
+    return _select(found, count, most, DISTINCT, False, choice)
+
+
+@njit
+def _select(found: Candidates, count: int, most: int, gap: float, by_piece: bool, choice: Choice) -> int:
+    kept = 0
+    unmark(choice, count)
+    while kept < most:
+        best = cheapest(found, count, choice)
+        if best < 0:
+            break
+        choice.marked[best] = True
+        alike = False
+        for i in range(kept):
+            other = choice.chosen[i]
+            if not by_piece or found.piece[other] == found.piece[best]:
+                alike = alike or apart2(found, other, best) < gap * gap
+        if not alike:
+            choice.chosen[kept] = best
+            kept += 1
+    return kept
+
+
+@njit
+def unmark(choice: Choice, count: int) -> None:
+    """No candidate is marked any more."""
+    for c in range(count):
+        choice.marked[c] = False
+
+
+@njit
+def cheapest(found: Candidates, count: int, choice: Choice) -> int:
+    """The unmarked candidate of least cost, -1 where none has a finite one."""
+    best = -1
+    for c in range(count):
+        if not choice.marked[c] and found.cost[c] < np.inf and (best < 0 or found.cost[c] < found.cost[best]):
+            best = c
+    return best
+
+
+@njit
+def like_a_marked(found: Candidates, count: int, candidate: int, choice: Choice) -> bool:
+    """Whether a candidate is near a marked one of the same piece and finite cost, and so on its way to it."""
+    for c in range(count):
+        if c == candidate or not choice.marked[c] or not found.cost[c] < np.inf:
+            continue
+        if found.piece[c] == found.piece[candidate] and apart2(found, c, candidate) < ALIKE * ALIKE:
+            return True
+    return False
+
+
+@njit
+def apart2(found: Candidates, c: int, other: int) -> float:
+    """Squared distance of two candidates, rad²."""
+    distance2 = 0.0
+    for j in range(found.x.shape[1]):
+        distance2 += (found.x[c, j] - found.x[other, j]) ** 2
+    return distance2
