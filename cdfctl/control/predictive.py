@@ -1,8 +1,9 @@
-"""The predictive controller: follow the best plan; where none is free, rows around its first step.
+"""The predictive controller: follow the best plan; where it is about to fail, rows around its first step.
 
-A plan that keeps its margins is followed as it is. Where none is found, the mean velocity of the one that lasts longest
-is the reference of the quadratic program, whose TVCBF rows are then violated least. The rows are not asked at other
-times: a free plan may pass nearer, and faster, than they allow.
+A plan is followed as it is while it keeps its margins for :data:`REACT` at least. Where none does, the mean velocity of
+the one that lasts longest is the reference of the quadratic program, whose TVCBF rows are then violated least. The rows
+are not asked at other times: a free plan may pass nearer, and faster, than they allow, and leaving it loses it. Every
+step without a plan that is free to its end is marked infeasible.
 """
 
 from __future__ import annotations
@@ -20,6 +21,9 @@ from cdfctl.control.reaching import moved
 from cdfctl.robots.robot import Robot
 from cdfctl.scenario.variants import Variant
 from cdfctl.types import Array, Decision, Rows, Scene
+
+REACT = 0.5
+"""s: the rows act where the best plan fails within this; until then it is followed while the search goes on."""
 
 
 class PredictiveCore(Core):
@@ -78,6 +82,8 @@ class PredictiveCore(Core):
         speed = self.robot.velocity_limit if speed is None else speed
         found = self._planner.plan(q, self._predictor.course(scene, t), goal, speed, stay)
         now = moved(scene, self._delay) if self._delay > 0.0 else scene
-        act = super().step if found.hit < inf else self.follow
-        decision = act(q, now, found.u)
+        decision = (super().step if found.hit < REACT else self.follow)(q, now, found.u)
+        if found.hit < inf:
+            status = "least-violation" if decision.status == "optimal" else decision.status
+            decision = replace(decision, infeasible=True, status=status)
         return replace(decision, plan_q=found.q, plan_t=found.t)

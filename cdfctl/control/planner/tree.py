@@ -148,8 +148,9 @@ def propose_toward(aim: Aim, best: Plan, tree: Tree, stream: Stream) -> int:
     not been.
     """
     q, n = tree.work, tree.work.shape[0]
+    # Few joints can be sampled in all their range; of many, most samples are taken near the straight way.
     x = uniform(stream)
-    spread = pi * x * x
+    spread = 2.0 * pi if uniform(stream) * n < 2.0 else pi * x * x
     for j in range(n):
         here = tree.q[0, j]
         low = max(aim.low[j], min(here, aim.goal[j]) - spread)
