@@ -64,6 +64,8 @@ def steps_of_c3(period: float) -> tuple[list[list[tuple[Array, Scene]]], list[fl
         trial = assemble(file, trial=index)
         runs.append([(step.state.q, step.scene) for step in trial.run()])
         controller = build(trial.robot, trial.scenario.controller, trial.scenario.task, period)
+        controller.step(State(0.0, runs[-1][0][0]), runs[-1][0][1])  # makes the workspaces
+        controller.reset()
         for q, scene in runs[-1]:
             times.append(timed(partial(controller.step, State(0.0, q), scene)))
     return runs, times
