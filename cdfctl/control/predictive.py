@@ -60,7 +60,7 @@ class PredictiveCore(Core):
         share = float(np.max(np.abs(asked) / limit))
         goal = np.minimum(np.maximum(q + asked * self._horizon, self.robot.lower), self.robot.upper)
         speed = limit * share if share > 0.0 else limit
-        return self.pursue(q, scene, goal, speed=speed)
+        return self.pursue(q, scene, goal, speed=speed, stay=self._horizon)
 
     def pursue(
         self, q: Array, scene: Scene, goal: Array, *, speed: Array | None = None, stay: float = 0.0, t: float = 0.0
