@@ -28,8 +28,8 @@ class Nearest(NamedTuple):
 class Closest(NamedTuple):
     """The pair of least signed distance (m): the robot's object, the obstacle's index, and their nearest points (3,).
 
-    In penetration the points are those of deepest penetration; of a cloud in penetration, those of its first point found
-    inside.
+    In penetration the points are those of deepest penetration; of a cloud in penetration, those of its first point
+    found inside.
     """
 
     distance: float

@@ -19,7 +19,7 @@ SLOW = 5.0  # s of processor time
 @pytest.mark.timeout(7200)
 @pytest.mark.parametrize(
     ("seed", "count"),
-    [(0, 200), pytest.param(1, 5000, marks=pytest.mark.long), pytest.param(2, 5000, marks=pytest.mark.long)],
+    [(0, 100), pytest.param(1, 5000, marks=pytest.mark.long), pytest.param(2, 5000, marks=pytest.mark.long)],
 )
 def test_every_file_ends_in_a_status_and_a_message(seed: int, count: int, tmp_path: Path) -> None:
     shutil.copy(HERE / "mutants.py", tmp_path / "tests_mutants.py")
@@ -42,7 +42,7 @@ def test_every_file_ends_in_a_status_and_a_message(seed: int, count: int, tmp_pa
         or answer["s"] > SLOW
         or answer["MB"] > 1024
     ]
-    assert bad == []
+    assert bad[:3] == []
     assert {path.name for path in inside.iterdir()} <= {"mutant.yaml", "out"}
     # The damage is neither fatal to all files nor harmless to all.
     shares = [sum(a["status"] == status for a in answers) / len(answers) for status in (0, 2)]
