@@ -28,10 +28,11 @@ from cdfctl.fields.kernel.parts import SceneParts
 from cdfctl.fields.kernel.search import Memory, new_memory
 from cdfctl.fields.kernel.starts import Table, empty_table
 from cdfctl.robots.robot import Robot
-from cdfctl.types import FieldQuery, Scene, Unit, as_vector
+from cdfctl.types import Array, FieldQuery, Scene, Unit, as_vector
 
 SPARE_MEMORY = 2  # contacts remembered beyond the sheets of the last query
 MOST_SHEETS = 16
+LEAP = 0.05  # m, or rad of a joint, between two queries, above which every obstacle concerned is searched widely
 
 
 class CDF:
@@ -80,6 +81,7 @@ class CDF:
     def reset(self) -> None:
         """Forget the contacts of earlier queries."""
         self._names: tuple[str, ...] = ()
+        self._last: tuple[Array, Array] | None = None  # q (n,) and poses (m, 7) of the last query
         self._memory = new_memory(0, MOST_SHEETS + SPARE_MEMORY, self.robot.n)
 
     def _query(self, q: ArrayLike, scene: Scene, sheets: int, *, every_obstacle: bool) -> FieldQuery:
@@ -88,7 +90,9 @@ class CDF:
         if self._rows.d.shape != (m, sheets):
             self._rows = new_contact_rows(m, sheets, self.robot.n)
         rows = self._rows
-        contact_rows(self._body, point, parts, self._remember(scene.names), self._table, sheets, rows, self._work)
+        memory = self._remember(scene.names)
+        self._mark_leaps(point, scene)
+        contact_rows(self._body, point, parts, memory, self._table, sheets, rows, self._work)
         empty = rows.filled == 0
         rows.d[empty & (rows.f < 0.0), 0] = -np.inf
         filled = np.arange(sheets) < rows.filled[:, None]
@@ -106,6 +110,13 @@ class CDF:
             contact_q=rows.contact_q[filled],
             unit="rad",
         )
+
+    def _mark_leaps(self, q: Array, scene: Scene) -> None:
+        """Mark the obstacles that moved, or all where the robot did, by more than :data:`LEAP` since the last query."""
+        if self._last is not None and len(self._last[1]) == len(scene):
+            moved = np.abs(scene.poses - self._last[1]).max(axis=1, initial=0.0)
+            self._memory.leapt[:] = (moved > LEAP) | (np.abs(q - self._last[0]).max() > LEAP)
+        self._last = (q, scene.poses.copy())
 
     def _remember(self, names: tuple[str, ...]) -> Memory:
         """The memory in the order of ``names``: that of obstacles no longer there is dropped."""

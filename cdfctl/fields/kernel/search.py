@@ -6,9 +6,10 @@ of the distance from q to the contact it is heading for, and must differ from th
 candidate is a contact only if no other piece is in penetration there; where one is, that piece touches earlier, and the
 search goes on with it.
 
-Between its turns an obstacle is *followed*: the contacts remembered from the last query are brought to convergence,
-and of the pieces as they stand at q the most promising one, if it may come before them. One obstacle a query has its
-turn: with m obstacles, what a wide search would find is found within m queries.
+Between its turns, and while it and the robot move little from query to query, an obstacle is *followed*: the contacts
+remembered from the last query are brought to convergence, and of the pieces as they stand at q the most promising one,
+if it may come before them. One obstacle a query has its turn: with m obstacles, what a wide search would find is found
+within m queries.
 """
 
 from __future__ import annotations
@@ -107,12 +108,14 @@ class Memory(Struct):
         piece: (m, w).
         x: (m, w, n).
         turn: (1,) counts the queries: it is the turn of obstacle ``turn % m``.
+        leapt: (m,) not 0 where obstacle or robot moved far since the last query, which calls for a wide search.
     """
 
     known: IntArray
     piece: IntArray
     x: Array
     turn: IntArray
+    leapt: IntArray
 
 
 def new_search(body: Body, remembered: int) -> Search:
@@ -136,7 +139,11 @@ def new_search(body: Body, remembered: int) -> Search:
 def new_memory(m: int, w: int, n: int) -> Memory:
     """An empty memory for m obstacles."""
     return Memory(
-        np.zeros(m, dtype=np.int64), np.zeros((m, w), dtype=np.int64), np.zeros((m, w, n)), np.zeros(1, dtype=np.int64)
+        np.zeros(m, dtype=np.int64),
+        np.zeros((m, w), dtype=np.int64),
+        np.zeros((m, w, n)),
+        np.zeros(1, dtype=np.int64),
+        np.zeros(m, dtype=np.int64),
     )
 
 
@@ -204,7 +211,7 @@ def nearest_contacts(
     for i in range(warm):
         add_start(body, q, parts, o, search, pieces + i, memory.piece[o, i], memory.x[o, i])
     wanted = sheets + SPARE
-    if cold or memory.turn[0] % memory.known.shape[0] == o:
+    if cold or memory.leapt[o] != 0 or memory.turn[0] % memory.known.shape[0] == o:
         count = _add_starts(body, q, parts, o, table, centre, size, search, count)
         kept = choose(found, count, (COLD_KEPT if cold else WIDE_KEPT) + sheets, choice)
         _improve_chosen(body, q, parts, o, search, kept, 2)
