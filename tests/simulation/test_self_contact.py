@@ -39,9 +39,7 @@ def folding(tmp_path: Path) -> Path:
     fixed = '<joint name="tip" type="fixed"><parent link="fore"/><child link="hand"/><origin xyz="1 0 0"/></joint>'
     joints = joint("j1", "base", "elbow0", 0.0) + joint("j2", "elbow", "fore", 0.0)
     elbow = '<joint name="e" type="fixed"><parent link="elbow0"/><child link="elbow"/><origin xyz="1 0 0"/></joint>'
-    path.write_text(
-        f'<robot name="arm">{links}<link name="elbow0"/><link name="fore"/>{joints}{elbow}{fixed}</robot>'
-    )
+    path.write_text(f'<robot name="arm">{links}<link name="elbow0"/><link name="fore"/>{joints}{elbow}{fixed}</robot>')
     return path
 
 
