@@ -15,6 +15,7 @@ from cdfctl.simulation.run_folder import read_run
 EXAMPLE = Path(__file__).resolve().parents[4] / "docs" / "examples" / "real_experiment.py"
 
 
+@pytest.mark.long  # two simulators in real time want cores of their own
 def test_the_second_arm_carries_the_ball(server: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     server.end()  # two simulators at once are one too many for two cores
