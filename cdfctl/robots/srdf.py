@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from cdfctl.errors import InputError, name_hint
+from cdfctl.robots.xml_file import read_robot_xml
 
 LinkPair = tuple[str, str]
 """Two link names in alphabetical order."""
@@ -26,7 +27,7 @@ def read_srdf(path: Path, links: Sequence[str]) -> frozenset[LinkPair]:
     Raises:
         InputError: the file is no SRDF, or names no link of this robot.
     """
-    root = _parse(path)
+    root = read_robot_xml(path, "SRDF", "an")
     known = frozenset(links)
     named: set[str] = set()
     disabled: set[LinkPair] = set()
@@ -77,27 +78,6 @@ def allowed_contacts(
         if all(link_pair(*pair) in off for pair in pairs):
             allowed.setdefault(link_pair(a, b), "SRDF")
     return allowed
-
-
-def _parse(path: Path) -> ElementTree.Element:
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such SRDF file") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    if b"<!ENTITY" in data:
-        raise InputError(f"{path}: an SRDF with XML entities is not read")
-    try:
-        root = ElementTree.fromstring(data)
-    except ElementTree.ParseError as error:
-        line, column = error.position
-        raise InputError(f"{path}:{line}:{column + 1}: not well-formed XML: {str(error).split(':')[0]}") from None
-    except (ValueError, LookupError) as error:  # an encoding that is not known
-        raise InputError(f"{path}: not readable as XML: {error}") from None
-    if root.tag != "robot":
-        raise InputError(f"{path}: the root element is <{root.tag}>, an SRDF has <robot>")
-    return root
 
 
 def _attribute(path: Path, element: ElementTree.Element, name: str) -> str:

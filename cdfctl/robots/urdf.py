@@ -16,6 +16,7 @@ from xml.etree.ElementTree import Element
 
 from cdfctl.errors import InputError, name_hint
 from cdfctl.robots.meshes import check_mesh_file
+from cdfctl.robots.xml_file import read_robot_xml
 
 MOVING_TYPES = ("revolute", "prismatic", "continuous")
 # Stands for "no limit" between here and the model; far beyond any angle, and still exact in radians.
@@ -81,23 +82,7 @@ def parse_urdf(path: Path) -> Element:
     """The root of a URDF's XML. Raises :class:`InputError` where the file is none, in one line."""
     if path.is_dir():
         raise InputError(f"{path}: is a directory, not a URDF file")
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such URDF file") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    if b"<!ENTITY" in data:
-        raise InputError(f"{path}: a URDF with XML entities is not read")
-    try:
-        root = ElementTree.fromstring(data)
-    except ElementTree.ParseError as error:
-        line, column = error.position
-        raise InputError(f"{path}:{line}:{column + 1}: not well-formed XML: {str(error).split(':')[0]}") from None
-    except (ValueError, LookupError) as error:  # an encoding that is not known
-        raise InputError(f"{path}: not readable as XML: {error}") from None
-    if root.tag != "robot":
-        raise InputError(f"{path}: the root element is <{root.tag}>, a URDF has <robot>")
+    root = read_robot_xml(path, "URDF", "a")
     root.attrib.setdefault("name", path.stem)
     if any("xacro" in str(element.tag) for element in root.iter()):
         raise InputError(f"{path}: contains xacro elements", hint="expand it first: xacro model.xacro > model.urdf")
