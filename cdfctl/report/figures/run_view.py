@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from cdfctl.errors import InputError
 from cdfctl.fields.field import Field, make_field
 from cdfctl.report.figures.style import signed
 from cdfctl.robots.robot import Robot
@@ -19,7 +18,7 @@ from cdfctl.scenario.variants import variant_named
 from cdfctl.simulation.checks import robot_of
 from cdfctl.simulation.clearance import Clearance
 from cdfctl.simulation.motion import SceneMotion
-from cdfctl.simulation.run_folder import TRAJECTORY, read_run
+from cdfctl.simulation.run_folder import check_fits, read_run
 from cdfctl.simulation.shapes import vector_of
 from cdfctl.types import Array, Scene, Trajectory
 
@@ -170,15 +169,7 @@ def view_run(folder: Path) -> RunView:
     run = read_run(folder)
     scenario = resolve(run.scenario)
     robot, motion = robot_of(scenario.robot), SceneMotion(scenario.obstacles)
-    n, m = run.trajectory.q.shape[1], run.trajectory.h.shape[1]
-    path = folder / TRAJECTORY
-    if n != robot.n:
-        raise InputError(f"{path}: is of {n} joints, but the scenario's robot '{robot.name}' has {robot.n}")
-    if m != len(motion):
-        raise InputError(f"{path}: is of {m} obstacles, but the scenario has {len(motion)}")
-    arrays = run.trajectory
-    if not all(np.isfinite(array).all() for array in (arrays.t, arrays.q, arrays.obstacle_pose)):
-        raise InputError(f"{path}: damaged: a time, a configuration or a pose is not finite", "run the scenario again")
+    check_fits(run, robot.name, robot.n, len(motion))
     task = scenario.task
     target = SceneMotion((task.target,)) if isinstance(task, ReachTask) else None
     return RunView(scenario, run.document, run.trajectory, robot, motion, target)
