@@ -12,20 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from ..benchmark.helpers import SMALL
+
 CDFCTL = [sys.executable, "-m", "cdfctl"]
-SCENARIO = """\
-version: 1
-name: small
-robot: {name: planar, q0: [0.5, 0.5]}
-task: {type: joint-goal, goal: [2.5, 0.4]}
-obstacles:
-  - name: disc
-    shape: {type: ball, radius: 0.3}
-    position: [{uniform: [-3.0, 3.0]}, {uniform: [2.5, 4.0]}, 0.0]
-    velocity: [0.1, {uniform: [-3.0, 0.0]}, 0.0]
-controller: {variant: sdf-tvcbf-qp, gain: 9.9}
-simulation: {dt: 0.1, time_limit: 3.0, tolerance: 0.1}
-"""
 BENCH = ["bench", "--scenario", "./small.yaml", "--trials", "400", "--seed", "3", "--quiet"]
 BUILD = ["build-cdf", "planar", "--resolution", "60", "--starts", "48", "--jobs", "1", "--quiet"]
 
@@ -59,7 +48,7 @@ def seconds(words: list[str]) -> float:
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_bench_killed_again_and_again(jobs: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    Path("small.yaml").write_text(SCENARIO)
+    Path("small.yaml").write_text(SMALL)
     whole = seconds([*CDFCTL, *BENCH, "--jobs", "2", "--out", "whole"])
     words = [*CDFCTL, *BENCH, "--jobs", str(jobs), "--out", "torn"]
     hit = killed_until_done(words, 25, random.Random(jobs), whole)
