@@ -5,8 +5,6 @@ The machine code holds what it calls of the fields' kernels, so the cache is nam
 
 from __future__ import annotations
 
-import hashlib
-import platform
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -16,7 +14,6 @@ import numba
 
 from cdfctl.cache import cache_dir, writable_dir
 from cdfctl.fields.kernel import jit
-from cdfctl.fields.kernel.jit import OPTIONS
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -36,20 +33,10 @@ def _compiled(function: Callable[P, T], *, forceinline: bool) -> Callable[P, T]:
     config: Any = numba.config
     if config.DISABLE_JIT:  # a debugger or a coverage run wants plain Python
         return function
-    folder = _cache()
-    # Numba reads its cache folder once, when a function is decorated: lend it ours for that moment only.
-    theirs = config.CACHE_DIR
-    config.CACHE_DIR = str(folder or theirs)
-    try:
-        return cast(Callable[P, T], numba.njit(cache=folder is not None, forceinline=forceinline, **OPTIONS)(function))
-    finally:
-        config.CACHE_DIR = theirs
+    return cast(Callable[P, T], jit.compiled_in(_cache(), function, forceinline))
 
 
 @cache
 def _cache() -> Path | None:
-    digest = hashlib.sha256(f"{numba.__version__} {platform.python_version()}".encode())
-    for folder in (Path(jit.__file__).parent, Path(__file__).parent):
-        for source in sorted(folder.glob("*.py")):
-            digest.update(source.read_bytes())
-    return writable_dir(cache_dir() / "kernels" / f"planner-{digest.hexdigest()[:16]}")
+    digest = jit.digest_of(Path(jit.__file__).parent, Path(__file__).parent)
+    return writable_dir(cache_dir() / "kernels" / f"planner-{digest}")

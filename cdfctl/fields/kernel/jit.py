@@ -59,16 +59,29 @@ def _compiled(function: Callable[P, T], forceinline: bool) -> Callable[P, T]:
     config: Any = numba.config
     if config.DISABLE_JIT:  # a debugger or a coverage run wants plain Python
         return function
-    folder = _kernel_cache()
+    return cast(Callable[P, T], _plain_integers(compiled_in(_kernel_cache(), function, forceinline)))
+
+
+def compiled_in(folder: Path | None, function: Callable[..., Any], forceinline: bool) -> Any:
+    """``function``, to be compiled with :data:`OPTIONS` and kept in ``folder``, or in no place where there is none."""
+    config: Any = numba.config
     # Numba reads its cache folder once, when a function is decorated: lend it ours for that moment only, so that the
     # caches of other packages in the process stay where they are.
     theirs = config.CACHE_DIR
     config.CACHE_DIR = str(folder or theirs)
     try:
-        compiled = numba.njit(cache=folder is not None, forceinline=forceinline, **OPTIONS)(function)
+        return numba.njit(cache=folder is not None, forceinline=forceinline, **OPTIONS)(function)
     finally:
         config.CACHE_DIR = theirs
-    return cast(Callable[P, T], _plain_integers(compiled))
+
+
+def digest_of(*folders: Path) -> str:
+    """A name for what is compiled from the sources in ``folders``: another text, another name."""
+    digest = hashlib.sha256(f"{numba.__version__} {platform.python_version()}".encode())
+    for folder in folders:
+        for source in sorted(folder.glob("*.py")):
+            digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def _plain_integers(compiled: Any) -> Any:
@@ -86,10 +99,7 @@ def _plain_integers(compiled: Any) -> Any:
 @cache
 def _kernel_cache() -> Path | None:
     """The folder of the machine code of these sources. Those of other sources go, but for the last few used."""
-    digest = hashlib.sha256(f"{numba.__version__} {platform.python_version()}".encode())
-    for source in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(source.read_bytes())
-    folder = writable_dir(cache_dir() / "kernels" / digest.hexdigest()[:16])
+    folder = writable_dir(cache_dir() / "kernels" / digest_of(Path(__file__).parent))
     if folder is not None:
         with contextlib.suppress(OSError):
             os.utime(folder)
