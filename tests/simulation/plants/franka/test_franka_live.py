@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import time
 from collections.abc import Callable
@@ -167,7 +168,9 @@ def test_stopped_in_flight(server: Any, assembled: Assembled, at_tick: Any) -> N
     result = trial.result()
     assert (result.verdict.outcome, len(result.trajectory.u)) == ("error", 20)
     assert result.reason is not None
-    assert "no new state of the arm for 0.5" in result.reason
+    noticed = re.search(r"no new state of the arm for (\d+\.\d+) s", result.reason)
+    assert noticed is not None  # not libfranka's own word, which comes after a second
+    assert float(noticed[1]) >= 0.5
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
