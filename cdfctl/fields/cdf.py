@@ -69,7 +69,7 @@ class CDF:
     def contacts(self, q: ArrayLike, scene: Scene, *, sheets: int = 1) -> FieldQuery:
         """Up to ``sheets`` distinct contacts of each obstacle, nearest first; no row for an obstacle out of reach.
 
-        Contacts are distinct if they are at least 0.1 rad apart.
+        Contacts are distinct if they are at least 0.1 rad apart, or 0.01 rad where different pieces of the robot touch.
 
         Raises:
             InputError: as :meth:`query`, or ``sheets`` is not 1 … 16.

@@ -10,7 +10,10 @@ from cdfctl.fields.kernel.structs import Struct
 from cdfctl.types import Array, BoolArray, IntArray
 
 ALIKE = 0.05  # rad: candidates of one piece nearer than this are one
-DISTINCT = 0.1  # rad: contacts nearer than this to a nearer one are not told apart
+# rad: contacts of one piece nearer than this are not told apart, nor those of two pieces nearer than the second figure,
+# where they meet at a joint. More would do harm: a robot between two contacts, each at its margin of 0.05 rad, that has a
+# row for only one of them is driven into the other.
+DISTINCT, MEETING = 0.1, 0.01
 
 
 class Candidates(Struct):
@@ -85,17 +88,18 @@ def choose(found: Candidates, count: int, most: int, choice: Choice) -> int:
 
     One nearer than :data:`ALIKE` to a better one of the same piece is passed over.
     """
-    return _select(found, count, most, ALIKE, True, choice)
+    return _select(found, count, most, ALIKE, 0.0, choice)
 
 
 @njit
 def choose_distinct(found: Candidates, count: int, most: int, choice: Choice) -> int:
-    """As :func:`choose`, passing over those nearer than :data:`DISTINCT` to a better one of any piece."""
-    return _select(found, count, most, DISTINCT, False, choice)
+    """As :func:`choose`, passing over those nearer to a better one than :data:`DISTINCT`: one sheet, one contact."""
+    return _select(found, count, most, DISTINCT, MEETING, choice)
 
 
 @njit
-def _select(found: Candidates, count: int, most: int, gap: float, by_piece: bool, choice: Choice) -> int:
+def _select(found: Candidates, count: int, most: int, gap: float, meeting: float, choice: Choice) -> int:
+    """``gap`` between candidates of one piece, ``meeting`` between those of two, rad."""
     kept = 0
     unmark(choice, count)
     while kept < most:
@@ -106,8 +110,8 @@ def _select(found: Candidates, count: int, most: int, gap: float, by_piece: bool
         alike = False
         for i in range(kept):
             other = choice.chosen[i]
-            if not by_piece or found.piece[other] == found.piece[best]:
-                alike = alike or apart2(found, other, best) < gap * gap
+            apart = gap if found.piece[other] == found.piece[best] else meeting
+            alike = alike or apart2(found, other, best) < apart * apart
         if not alike:
             choice.chosen[kept] = best
             kept += 1

@@ -36,8 +36,9 @@ from cdfctl.types import Array
 FAR = 0.12  # rad of linearised distance to the surface, above which a step only restores
 LONGEST_RESTORATION = 1.0  # rad
 LONGEST_STEP = 0.35  # rad
-CURVATURE = 20.0  # σ to begin with, 1/m: of a surface of 5 cm radius; half and twice as much cost a fifth more steps
+CURVATURE = 20.0  # σ to begin with where the shapes do not tell, 1/m: of a surface of 5 cm radius
 GREATEST_CURVATURE = 60.0  # 1/m
+SLOWLY = 0.2  # share of the residual left by a step that calls for another σ
 LOCAL = 0.2  # rad: the residual below which a secant says something of the curvature at the contact
 AT_LIMIT = 1e-6  # rad: a joint nearer than this to a limit is at it
 STILL = 1e-9  # m/rad: no joint moves the contact
@@ -145,10 +146,21 @@ def advance(
     copy(found.z[c], scratch.z)
     evaluate(body, q, parts, o, found, c, work)
     if near and multiplier > 0.0:
-        if residual < LOCAL and found.residual[c] < residual:
+        if not found.residual[c] < residual:
+            found.curvature[c] = curvature_at(body, parts, o, found.piece[c])
+        elif residual < LOCAL and found.residual[c] > SLOWLY * residual:
             learn_curvature(found, c, multiplier, scratch)
-        else:
-            found.curvature[c] = CURVATURE
+
+
+@njit
+def curvature_at(body: Body, parts: Parts, o: int, k: int) -> float:
+    """σ to begin with, 1/m, for piece k and obstacle o.
+
+    Where a corner of one core touches, the surface around it is a ball of the two radii together, and σ is exactly its
+    curvature. Most contacts are of that kind. Without radii there is nothing to go by.
+    """
+    radii: float = body.sets.info[k].radius + parts.sets.info[parts.first[o]].radius
+    return 1.0 / radii if radii * GREATEST_CURVATURE > 1.0 else CURVATURE
 
 
 @njit

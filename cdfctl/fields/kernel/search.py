@@ -31,9 +31,9 @@ from cdfctl.fields.kernel.candidates import (
     unmark,
 )
 from cdfctl.fields.kernel.contact import (
-    CURVATURE,
     Scratch,
     advance,
+    curvature_at,
     evaluate,
     evaluate_placed,
     is_near,
@@ -161,7 +161,7 @@ def pieces_at(body: Body, q: Array, parts: Parts, o: int, search: Search) -> int
     """The first candidates become the pieces as they stand at q, in their order; the one nearest to obstacle o."""
     found, nearest = search.found, 0
     for k in range(body.joint.shape[0]):
-        _begin(body, q, found, k, k, q)
+        _begin(body, q, parts, o, found, k, k, q)
         found.place[k] = found.place.shape[0]
         evaluate_placed(body, q, parts, o, found, k, search.work)
         if found.f[k] < found.f[nearest]:
@@ -170,9 +170,9 @@ def pieces_at(body: Body, q: Array, parts: Parts, o: int, search: Search) -> int
 
 
 @njit
-def _begin(body: Body, q: Array, found: Candidates, c: int, k: int, x: Array) -> None:
+def _begin(body: Body, q: Array, parts: Parts, o: int, found: Candidates, c: int, k: int, x: Array) -> None:
     """Candidate c begins with piece k at x, joints that do not move the piece as in q."""
-    found.piece[c], found.curvature[c] = k, CURVATURE
+    found.piece[c], found.curvature[c] = k, curvature_at(body, parts, o, k)
     for j in range(q.shape[0]):
         inside = min(max(x[j], body.chain.lower[j]), body.chain.upper[j])
         found.x[c, j] = inside if body.chain.moves[j, body.joint[k]] else q[j]
@@ -181,7 +181,7 @@ def _begin(body: Body, q: Array, found: Candidates, c: int, k: int, x: Array) ->
 @njit
 def add_start(body: Body, q: Array, parts: Parts, o: int, search: Search, c: int, k: int, x: Array) -> None:
     """Candidate c begins with piece k at x, joints that do not move the piece as in q, and is evaluated."""
-    _begin(body, q, search.found, c, k, x)
+    _begin(body, q, parts, o, search.found, c, k, x)
     evaluate(body, q, parts, o, search.found, c, search.work)
 
 
