@@ -18,21 +18,19 @@ from __future__ import annotations
 from functools import cached_property
 from pathlib import Path
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from cdfctl.errors import InputError
 from cdfctl.fields.kernel.body import body_of
 from cdfctl.fields.kernel.cdf_rows import Workspace, contact_rows, new_contact_rows, new_workspace
 from cdfctl.fields.kernel.parts import SceneParts
-from cdfctl.fields.kernel.search import Memory, new_memory
+from cdfctl.fields.kernel.search import UNKNOWN, Memory, new_memory
 from cdfctl.fields.kernel.starts import Table, empty_table
 from cdfctl.robots.robot import Robot
-from cdfctl.types import Array, FieldQuery, Scene, Unit, as_vector
+from cdfctl.types import FieldQuery, Scene, Unit, as_vector
 
 SPARE_MEMORY = 2  # contacts remembered beyond the sheets of the last query
 MOST_SHEETS = 16
-LEAP = 0.05  # m, or rad of a joint, between two queries, above which every obstacle concerned is searched widely
 
 
 class CDF:
@@ -50,8 +48,9 @@ class CDF:
         self._body = body_of(robot)
         self._table = empty_table(robot.n) if table is None else table
         self._parts = SceneParts()
-        self._rows = new_contact_rows(0, 1, robot.n)
-        self.reset()
+        self._room, self._rows = (0, 1), new_contact_rows(0, 1, robot.n)
+        self._names: tuple[str, ...] = ()
+        self._memory = new_memory(0, MOST_SHEETS + SPARE_MEMORY, robot.n)
 
     @cached_property
     def _work(self) -> Workspace:
@@ -80,43 +79,26 @@ class CDF:
 
     def reset(self) -> None:
         """Forget the contacts of earlier queries."""
-        self._names: tuple[str, ...] = ()
-        self._last: tuple[Array, Array] | None = None  # q (n,) and poses (m, 7) of the last query
-        self._memory = new_memory(0, MOST_SHEETS + SPARE_MEMORY, self.robot.n)
+        self._memory.known[:], self._memory.turn[:] = UNKNOWN, 0
 
     def _query(self, q: ArrayLike, scene: Scene, sheets: int, *, every_obstacle: bool) -> FieldQuery:
         point, parts = as_vector(q, self.robot.n, "q"), self._parts.of(scene)
-        m = len(scene)
-        if self._rows.d.shape != (m, sheets):
-            self._rows = new_contact_rows(m, sheets, self.robot.n)
-        rows = self._rows
-        memory = self._remember(scene.names)
-        self._mark_leaps(point, scene)
-        contact_rows(self._body, point, parts, memory, self._table, sheets, rows, self._work)
-        empty = rows.filled == 0
-        rows.d[empty & (rows.f < 0.0), 0] = -np.inf
-        filled = np.arange(sheets) < rows.filled[:, None]
-        if every_obstacle:
-            filled[:, 0] = True
-        obstacle, _ = np.nonzero(filled)
-        link = np.where(filled & ~empty[:, None], self._body.link[rows.piece], -1)
+        room = (len(scene), sheets)
+        if self._room != room:
+            self._rows, self._room = new_contact_rows(*room, self.robot.n), room
+        rows, memory = self._rows, self._remember(scene.names)
+        contact_rows(self._body, point, parts, memory, self._table, sheets, every_obstacle, rows, self._work)
+        count = rows.count[0]
         return FieldQuery(
-            obstacle=obstacle.astype(np.int64),
-            link=link[filled],
-            d=rows.d[filled],
-            dq=rows.dq[filled],
-            dt=rows.dt[filled],
-            valid=rows.valid[filled],
-            contact_q=rows.contact_q[filled],
+            obstacle=rows.obstacle[:count].copy(),
+            link=rows.link[:count].copy(),
+            d=rows.d[:count].copy(),
+            dq=rows.dq[:count].copy(),
+            dt=rows.dt[:count].copy(),
+            valid=rows.valid[:count].copy(),
+            contact_q=rows.contact_q[:count].copy(),
             unit="rad",
         )
-
-    def _mark_leaps(self, q: Array, scene: Scene) -> None:
-        """Mark the obstacles that moved, or all where the robot did, by more than :data:`LEAP` since the last query."""
-        if self._last is not None and len(self._last[1]) == len(scene):
-            moved = np.abs(scene.poses - self._last[1]).max(axis=1, initial=0.0)
-            self._memory.leapt[:] = (moved > LEAP) | (np.abs(q - self._last[0]).max() > LEAP)
-        self._last = (q, scene.poses.copy())
 
     def _remember(self, names: tuple[str, ...]) -> Memory:
         """The memory in the order of ``names``: that of obstacles no longer there is dropped."""
@@ -125,9 +107,9 @@ class CDF:
             self._memory = new_memory(len(names), old.piece.shape[1], self.robot.n)
             for i, name in enumerate(names):
                 if name in places:
-                    for member in ("known", "piece", "x"):
+                    for member in ("known", "piece", "x", "pose"):
                         getattr(self._memory, member)[i] = getattr(old, member)[places[name]]
-            self._memory.turn[:] = old.turn
+            self._memory.turn[:], self._memory.q[:] = old.turn, old.q
         self._names = names
         return self._memory
 

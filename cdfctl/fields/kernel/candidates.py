@@ -10,9 +10,9 @@ from cdfctl.fields.kernel.structs import Struct
 from cdfctl.types import Array, BoolArray, IntArray
 
 ALIKE = 0.05  # rad: candidates of one piece nearer than this are one
-# rad: contacts of one piece nearer than this are not told apart, nor those of two pieces nearer than the second figure,
-# where they meet at a joint. More would do harm: a robot between two contacts, each at its margin of 0.05 rad, that has a
-# row for only one of them is driven into the other.
+# rad: contacts of one piece nearer than the first figure are not told apart, nor those of two pieces nearer than the
+# second, where they meet at a joint. More would do harm: a robot between two contacts, each at its margin of 0.05 rad,
+# that has a row for only one of them is driven into the other.
 DISTINCT, MEETING = 0.1, 0.01
 
 

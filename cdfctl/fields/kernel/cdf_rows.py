@@ -21,7 +21,15 @@ from cdfctl.fields.kernel.escape import Escape, escape_from, new_escape
 from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.parts import Parts, obstacle_pose, time_derivative
 from cdfctl.fields.kernel.projection import copy
-from cdfctl.fields.kernel.search import Memory, Search, nearest_contacts, new_search, pieces_at, place_at
+from cdfctl.fields.kernel.search import (
+    Memory,
+    Search,
+    begin_query,
+    nearest_contacts,
+    new_search,
+    pieces_at,
+    place_at,
+)
 from cdfctl.fields.kernel.starts import Table, table_starts
 from cdfctl.fields.kernel.structs import Struct
 from cdfctl.fields.kernel.vec import Vec, add, rotate, vec, vec3
@@ -32,16 +40,18 @@ UNMOVED = 1e-6  # m/rad: a contact whose gradient over the free joints is shorte
 
 
 class ContactRows(Struct):
-    """m obstacles of ``sheets`` rows each, and the signed distance of every link for those who want it too.
+    """Room for r rows, those of the first obstacle first, and for what is known of the m obstacles.
 
     Attributes:
-        filled: (m,) how many rows of an obstacle are filled. Where none is, the first says so: d = +inf, invalid.
-        piece: (m, sheets); ``d``, ``dt``, ``valid`` (m, sheets); ``dq``, ``contact_q`` (m, sheets, n).
+        count: (1,) how many rows are filled.
+        obstacle, link: (r,) which ones touch; ``link`` is -1 in a row that says there is no contact.
+        d, dt, valid: (r,); ``dq``, ``contact_q`` (r, n).
         f: (m,) least signed distance of the pieces at q, m.
     """
 
-    filled: IntArray
-    piece: IntArray
+    count: IntArray
+    obstacle: IntArray
+    link: IntArray
     d: Array
     dq: Array
     dt: Array
@@ -51,15 +61,17 @@ class ContactRows(Struct):
 
 
 def new_contact_rows(m: int, sheets: int, n: int) -> ContactRows:
-    """Rows not filled yet."""
+    """Rows for m obstacles of up to ``sheets`` each, not filled yet."""
+    r = m * sheets
     return ContactRows(
-        np.zeros(m, dtype=np.int64),
-        np.zeros((m, sheets), dtype=np.int64),
-        np.full((m, sheets), np.inf),
-        np.zeros((m, sheets, n)),
-        np.zeros((m, sheets)),
-        np.zeros((m, sheets), dtype=np.bool_),
-        np.full((m, sheets, n), np.nan),
+        np.zeros(1, dtype=np.int64),
+        np.zeros(r, dtype=np.int64),
+        np.zeros(r, dtype=np.int64),
+        np.zeros(r),
+        np.zeros((r, n)),
+        np.zeros(r),
+        np.zeros(r, dtype=np.bool_),
+        np.zeros((r, n)),
         np.zeros(m),
     )
 
@@ -78,31 +90,49 @@ def new_workspace(body: Body, remembered: int) -> Workspace:
 
 @njit
 def contact_rows(
-    body: Body, q: Array, parts: Parts, memory: Memory, table: Table, sheets: int, rows: ContactRows, work: Workspace
+    body: Body,
+    q: Array,
+    parts: Parts,
+    memory: Memory,
+    table: Table,
+    sheets: int,
+    every_obstacle: bool,
+    rows: ContactRows,
+    work: Workspace,
 ) -> None:
-    """Fill ``rows`` for all obstacles at q (n,)."""
-    memory.turn[0] += 1
+    """Fill ``rows`` for all obstacles at q (n,).
+
+    If ``every_obstacle``, one without a contact has a row too, which says so: d = +inf, or -inf in a penetration
+    without a way out, and not valid.
+    """
+    begin_query(memory, q, parts)
     found = work.search.found
     place_at(body, q, work.search)
+    count = 0
     for o in range(parts.first.shape[0] - 1):
         nearest = pieces_at(body, q, parts, o, work.search)
         rows.f[o] = found.f[nearest]
         centre, size = _ball_around(parts, o, vec(found.b, nearest))
         if found.f[nearest] < 0.0:
-            rows.filled[o] = _escape_row(body, q, parts, o, memory, table, centre, rows, work)
+            filled = _escape_row(body, q, parts, o, memory, table, centre, rows, count, work)
         else:
-            rows.filled[o] = nearest_contacts(body, q, parts, o, memory, table, centre, size, sheets, work.search)
-            for i in range(rows.filled[o]):
-                _fill(body, q, parts, o, work.search, work.search.choice.chosen[i], rows, i)
-        if rows.filled[o] == 0:
-            _leave_empty(rows, o)
+            filled = nearest_contacts(body, q, parts, o, memory, table, centre, size, sheets, work.search)
+            for i in range(filled):
+                _fill(body, q, parts, o, work.search, work.search.choice.chosen[i], rows, count + i)
+        if filled == 0 and every_obstacle:
+            _say_none(rows, o, count, -np.inf if found.f[nearest] < 0.0 else np.inf)
+            filled = 1
+        count += filled
+    rows.count[0] = count
 
 
 @njit
-def _leave_empty(rows: ContactRows, o: int) -> None:
-    rows.d[o, 0], rows.dt[o, 0], rows.valid[o, 0] = np.inf, 0.0, False
-    for j in range(rows.dq.shape[2]):
-        rows.dq[o, 0, j], rows.contact_q[o, 0, j] = 0.0, np.nan
+def _say_none(rows: ContactRows, o: int, i: int, d: float) -> None:
+    """Row i: obstacle o has no contact."""
+    rows.obstacle[i], rows.link[i] = o, -1
+    rows.d[i], rows.dt[i], rows.valid[i] = d, 0.0, False
+    for j in range(rows.dq.shape[1]):
+        rows.dq[i, j], rows.contact_q[i, j] = 0.0, np.nan
 
 
 @njit
@@ -131,23 +161,23 @@ def _fill(body: Body, q: Array, parts: Parts, o: int, search: Search, c: int, ro
             g2 += g[j] * g[j]
     D = sqrt(D2)
     rate = time_derivative(parts, o, vec(found.b, c), vec(found.normal, c))
-    rows.piece[o, i], rows.d[o, i] = found.piece[c], D
+    rows.obstacle[i], rows.link[i], rows.d[i] = o, body.link[found.piece[c]], D
     at_contact = D < AT_CONTACT and g2 == whole2
-    rows.valid[o, i] = sqrt(g2) > UNMOVED and (at_contact or D > 0.0)
+    rows.valid[i] = sqrt(g2) > UNMOVED and (at_contact or D > 0.0)
     for j in range(q.shape[0]):
-        rows.contact_q[o, i, j] = x[j]
-        if not rows.valid[o, i]:
-            rows.dq[o, i, j] = 0.0
+        rows.contact_q[i, j] = x[j]
+        if not rows.valid[i]:
+            rows.dq[i, j] = 0.0
         elif at_contact:
-            rows.dq[o, i, j] = g[j] / sqrt(g2)
+            rows.dq[i, j] = g[j] / sqrt(g2)
         else:
-            rows.dq[o, i, j] = (q[j] - x[j]) / D
-    if not rows.valid[o, i]:
-        rows.dt[o, i] = 0.0
+            rows.dq[i, j] = (q[j] - x[j]) / D
+    if not rows.valid[i]:
+        rows.dt[i] = 0.0
     elif at_contact:
-        rows.dt[o, i] = rate / sqrt(g2)
+        rows.dt[i] = rate / sqrt(g2)
     else:
-        rows.dt[o, i] = rate * sqrt(free2) / (D * sqrt(g2))
+        rows.dt[i] = rate * sqrt(free2) / (D * sqrt(g2))
 
 
 @njit
@@ -160,10 +190,11 @@ def _escape_row(
     table: Table,
     centre: Vec,
     rows: ContactRows,
+    i: int,
     work: Workspace,
 ) -> int:
-    """The one row of an obstacle in penetration; how many rows, 0 where no way out was found."""
-    escape, best = work.escape, np.inf
+    """The one row of an obstacle in penetration, row i; how many rows, 0 where no way out was found."""
+    escape, best, touching = work.escape, np.inf, 0
     starts = table_starts(body, q, table, centre, work.search.entries)
     warm = max(0, memory.known[o])
     for s in range(1 + warm + starts):
@@ -178,22 +209,23 @@ def _escape_row(
         D = escape_from(body, q, parts, o, escape, work.search.work)
         if best > D:
             best = D
-            _fill_escape(body, q, o, D, escape, rows)
+            touching = _fill_escape(body, q, o, D, escape, rows, i)
     if best < np.inf:
         memory.known[o] = 1
-        memory.piece[o, 0] = rows.piece[o, 0]
-        copy(rows.contact_q[o, 0], memory.x[o, 0])
+        memory.piece[o, 0] = touching
+        copy(rows.contact_q[i], memory.x[o, 0])
         return 1
     return 0
 
 
 @njit
-def _fill_escape(body: Body, q: Array, o: int, D: float, escape: Escape, rows: ContactRows) -> None:
+def _fill_escape(body: Body, q: Array, o: int, D: float, escape: Escape, rows: ContactRows, i: int) -> int:
+    """Row i from the way out in ``escape``; the piece that touches there."""
     touching = 0
     for k in range(escape.f.shape[0]):
         if escape.mu[k] > escape.mu[touching] or (escape.mu[touching] <= 0.0 and escape.f[k] < escape.f[touching]):
             touching = k
-    rows.piece[o, 0], rows.d[o, 0] = touching, -D
+    rows.obstacle[i], rows.link[i], rows.d[i] = o, body.link[touching], -D
     g = escape.g[touching]
     g2, rate = 0.0, 0.0
     for j in range(q.shape[0]):
@@ -201,16 +233,17 @@ def _fill_escape(body: Body, q: Array, o: int, D: float, escape: Escape, rows: C
     for k in range(escape.mu.shape[0]):
         rate += escape.mu[k] * escape.dt[k]
     at_contact = D < AT_CONTACT
-    rows.valid[o, 0] = sqrt(g2) > UNMOVED
+    rows.valid[i] = sqrt(g2) > UNMOVED
     for j in range(q.shape[0]):
-        rows.contact_q[o, 0, j] = escape.x[j]
-        if not rows.valid[o, 0]:
-            rows.dq[o, 0, j] = 0.0
+        rows.contact_q[i, j] = escape.x[j]
+        if not rows.valid[i]:
+            rows.dq[i, j] = 0.0
         elif at_contact:
-            rows.dq[o, 0, j] = g[j] / sqrt(g2)
+            rows.dq[i, j] = g[j] / sqrt(g2)
         else:
-            rows.dq[o, 0, j] = (escape.x[j] - q[j]) / D
-    if not rows.valid[o, 0]:
-        rows.dt[o, 0] = 0.0
+            rows.dq[i, j] = (escape.x[j] - q[j]) / D
+    if not rows.valid[i]:
+        rows.dt[i] = 0.0
     else:
-        rows.dt[o, 0] = escape.dt[touching] / sqrt(g2) if at_contact else rate / D
+        rows.dt[i] = escape.dt[touching] / sqrt(g2) if at_contact else rate / D
+    return touching

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from operator import is_
+
 import numpy as np
 
 from cdfctl.errors import InputError
@@ -53,10 +55,10 @@ class Parts(Struct):
 
 
 class SceneParts:
-    """The parts of the latest scene. Shapes are converted again only when the scene has another ``shapes`` tuple."""
+    """The parts of the latest scene. Shapes are converted again only when the scene has others."""
 
     def __init__(self) -> None:
-        self._shapes: tuple[Shape, ...] | None = None
+        self._shapes: tuple[Shape, ...] = ()
         self._parts: Parts | None = None
 
     def of(self, scene: Scene) -> Parts:
@@ -65,14 +67,20 @@ class SceneParts:
         Raises:
             InputError: a number of the scene is not finite.
         """
-        if self._parts is None or scene.shapes is not self._shapes:
-            self._parts, self._shapes = parts_of(scene.shapes), scene.shapes
+        if self._parts is None or not _same(scene.shapes, self._shapes):
+            self._parts = parts_of(scene.shapes)
+        self._shapes = scene.shapes
         parts = self._parts
         parts.pose[:], parts.twist[:] = scene.poses, scene.twists
         if not (np.isfinite(parts.pose).all() and np.isfinite(parts.twist).all()):
             raise InputError("the poses and twists of the obstacles must be finite")
         turn_obstacles(parts.pose, parts.rotation)
         return parts
+
+
+def _same(shapes: tuple[Shape, ...], others: tuple[Shape, ...]) -> bool:
+    """Whether these are the same shapes, each the very object: a mesh is not compared vertex by vertex."""
+    return shapes is others or (len(shapes) == len(others) and all(map(is_, shapes, others)))
 
 
 def parts_of(shapes: tuple[Shape, ...]) -> Parts:

@@ -66,6 +66,7 @@ COLD_KEPT = 16  # starts that get steps, beyond the contacts asked for, in a fir
 WIDE_KEPT = 5  # and in a later one
 COLD_SECOND = 4  # of these, those that go on after two steps
 WIDE_SECOND = 1
+LEAP = 0.05  # m, or rad of a joint, between two queries: an obstacle that moved so far is searched widely
 SPARE = 1  # contacts looked for beyond those asked for
 RETRIES = 2  # candidates that may turn out to be no contact, with a memory
 COLD_STEPS = 30  # at most, to finish a contact, in a first query
@@ -108,7 +109,8 @@ class Memory(Struct):
         piece: (m, w).
         x: (m, w, n).
         turn: (1,) counts the queries: it is the turn of obstacle ``turn % m``.
-        leapt: (m,) not 0 where obstacle or robot moved far since the last query, which calls for a wide search.
+        leapt: (m,) not 0 where obstacle or robot moved by more than :data:`LEAP` since the last query.
+        q, pose: (n,), (m, 7) of the last query.
     """
 
     known: IntArray
@@ -116,6 +118,8 @@ class Memory(Struct):
     x: Array
     turn: IntArray
     leapt: IntArray
+    q: Array
+    pose: Array
 
 
 def new_search(body: Body, remembered: int) -> Search:
@@ -144,7 +148,26 @@ def new_memory(m: int, w: int, n: int) -> Memory:
         np.zeros((m, w, n)),
         np.zeros(1, dtype=np.int64),
         np.zeros(m, dtype=np.int64),
+        np.zeros(n),
+        np.zeros((m, 7)),
     )
+
+
+@njit
+def begin_query(memory: Memory, q: Array, parts: Parts) -> None:
+    """Count the query and mark what has moved far since the last one."""
+    first = memory.turn[0] == 0
+    memory.turn[0] += 1
+    robot = 0.0
+    for j in range(q.shape[0]):
+        robot = max(robot, abs(q[j] - memory.q[j]))
+        memory.q[j] = q[j]
+    for o in range(memory.leapt.shape[0]):
+        moved = robot
+        for j in range(7):
+            moved = max(moved, abs(parts.pose[o, j] - memory.pose[o, j]))
+            memory.pose[o, j] = parts.pose[o, j]
+        memory.leapt[o] = 1 if moved > LEAP and not first else 0
 
 
 @njit

@@ -86,8 +86,7 @@ def _packed(name: str, value: Any) -> tuple[types.Type, list[int]]:
     if isinstance(value, np.ndarray):
         if not value.flags.c_contiguous:
             raise ValueError(f"{name}: an array in a struct must be contiguous")
-        kind = numba.typeof(value).copy(layout="C", readonly=False)
-        return kind, [value.ctypes.data, *value.shape]
+        return _array_of(value.dtype, value.ndim), [value.ctypes.data, *value.shape]
     if isinstance(value, Struct):
         return value._numba_type_, [value._address]  # type: ignore[attr-defined] # set by __post_init__
     if isinstance(value, Compiled):
@@ -97,6 +96,12 @@ def _packed(name: str, value: Any) -> tuple[types.Type, list[int]]:
     raise TypeError(
         f"{name}: a struct holds arrays, floats, structs and compiled functions, not {type(value).__name__}"
     )
+
+
+@lru_cache(maxsize=64)
+def _array_of(dtype: np.dtype[Any], ndim: int) -> types.Array:
+    """Numba's own look at an array takes as long as a query does to fill it."""
+    return types.Array(numba.from_dtype(dtype), ndim, "C")
 
 
 @dataclass(frozen=True)

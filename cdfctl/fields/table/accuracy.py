@@ -248,8 +248,8 @@ class HeldOut:
         """The distance to the ball at ``point``, inf for none, and whether q is clear of it."""
         rows = new_contact_rows(1, 1, self._n)
         self._parts.pose[0, :3] = point
-        contact_rows(self._body, q, self._parts, memory, table, 1, rows, self._work)
-        return (float(rows.d[0, 0]) if rows.filled[0] else np.inf), bool(rows.f[0] > 0.0)
+        contact_rows(self._body, q, self._parts, memory, table, 1, False, rows, self._work)
+        return (float(rows.d[0]) if rows.count[0] else np.inf), bool(rows.f[0] > 0.0)
 
     def _table_alone(self, q: Array, point: Array) -> float:
         count = table_starts(self._body, q, self._table, tuple(point), self._nearest)
