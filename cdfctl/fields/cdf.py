@@ -23,8 +23,8 @@ from numpy.typing import ArrayLike
 from cdfctl.errors import InputError
 from cdfctl.fields.kernel.body import body_of
 from cdfctl.fields.kernel.cdf_rows import Workspace, contact_rows, new_contact_rows, new_workspace
+from cdfctl.fields.kernel.memory import UNKNOWN, Memory, new_memory
 from cdfctl.fields.kernel.parts import SceneParts
-from cdfctl.fields.kernel.search import UNKNOWN, Memory, new_memory
 from cdfctl.fields.kernel.starts import Table, empty_table
 from cdfctl.robots.robot import Robot
 from cdfctl.types import FieldQuery, Scene, Unit, as_vector

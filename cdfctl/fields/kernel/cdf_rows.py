@@ -19,17 +19,10 @@ from cdfctl.fields.kernel.body import Body
 from cdfctl.fields.kernel.contact import AT_LIMIT
 from cdfctl.fields.kernel.escape import Escape, escape_from, new_escape
 from cdfctl.fields.kernel.jit import njit
+from cdfctl.fields.kernel.memory import Memory, begin_query
 from cdfctl.fields.kernel.parts import Parts, obstacle_pose, time_derivative
 from cdfctl.fields.kernel.projection import copy
-from cdfctl.fields.kernel.search import (
-    Memory,
-    Search,
-    begin_query,
-    nearest_contacts,
-    new_search,
-    pieces_at,
-    place_at,
-)
+from cdfctl.fields.kernel.search import Search, nearest_contacts, new_search, pieces_at, place_at
 from cdfctl.fields.kernel.starts import Table, table_starts
 from cdfctl.fields.kernel.structs import Struct
 from cdfctl.fields.kernel.vec import Vec, add, rotate, vec, vec3

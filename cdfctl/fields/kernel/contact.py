@@ -10,7 +10,8 @@ f and the multiplier λ (least squares on the free joints)
 
 where H_ij = -ν·(z_i × J_j), i <= j, is the exact second derivative of f for a contact point fixed to the link, T the
 Jacobian of that point within the tangent plane, and σ stands for the curvature of the two surfaces. The kernel does not
-compute that one: σ begins with a constant and, near the end, follows from how the residual changed over the last step.
+compute that one: σ begins with the curvature of a ball of the two radii, and where a step gained little it follows from
+how the residual changed.
 B decides only how fast the iteration converges, never to what: an identity in its place needs twice the steps and fails
 four times as often.
 """

@@ -43,8 +43,8 @@ from cdfctl.fields.kernel.contact import (
 )
 from cdfctl.fields.kernel.distance import Work, new_work
 from cdfctl.fields.kernel.jit import njit
+from cdfctl.fields.kernel.memory import UNKNOWN, Memory, keep
 from cdfctl.fields.kernel.parts import Parts, parts_of
-from cdfctl.fields.kernel.projection import copy
 from cdfctl.fields.kernel.starts import (
     Samples,
     Starts,
@@ -57,7 +57,7 @@ from cdfctl.fields.kernel.starts import (
 )
 from cdfctl.fields.kernel.structs import Struct, compiled
 from cdfctl.fields.kernel.vec import Vec
-from cdfctl.types import Array, IntArray
+from cdfctl.types import Array
 
 SWINGS = 8  # one-joint turns kept as starts
 SPREAD = 12  # samples kept as starts
@@ -66,7 +66,6 @@ COLD_KEPT = 16  # starts that get steps, beyond the contacts asked for, in a fir
 WIDE_KEPT = 5  # and in a later one
 COLD_SECOND = 4  # of these, those that go on after two steps
 WIDE_SECOND = 1
-LEAP = 0.05  # m, or rad of a joint, between two queries: an obstacle that moved so far is searched widely
 SPARE = 1  # contacts looked for beyond those asked for
 RETRIES = 2  # candidates that may turn out to be no contact, with a memory
 COLD_STEPS = 30  # at most, to finish a contact, in a first query
@@ -74,7 +73,6 @@ WARM_STEPS = 8  # and in a later one
 SLOW, PATIENCE = 0.8, 3  # share of the gap that so many steps in a row leave, where a candidate is given up
 CLOSE = 5e-3  # rad: the residual at which a candidate's cost is good enough to compare
 CONVERGED = 1e-4  # rad: and at which a contact is done; its distance is right to the square of it
-UNKNOWN, NOTHING = 0, -1  # in a memory: nothing is known of an obstacle; no contact was found
 TOUCH = 5e-5  # m: greatest |f| of a contact, and the penetration of other pieces that is overlooked
 
 
@@ -101,27 +99,6 @@ class Search(Struct):
     advance: Callable[[Body, Array, Parts, int, Candidates, int, Scratch, Work], None]
 
 
-class Memory(Struct):
-    """Contacts remembered from the last query, obstacle by obstacle: starts of the next one.
-
-    Attributes:
-        known: (m,) how many; 0 where nothing is known yet, -1 where the last query found no contact.
-        piece: (m, w).
-        x: (m, w, n).
-        turn: (1,) counts the queries: it is the turn of obstacle ``turn % m``.
-        leapt: (m,) not 0 where obstacle or robot moved by more than :data:`LEAP` since the last query.
-        q, pose: (n,), (m, 7) of the last query.
-    """
-
-    known: IntArray
-    piece: IntArray
-    x: Array
-    turn: IntArray
-    leapt: IntArray
-    q: Array
-    pose: Array
-
-
 def new_search(body: Body, remembered: int) -> Search:
     """A workspace for ``body`` and memories of ``remembered`` contacts an obstacle."""
     k, n = len(body.joint), len(body.chain.parent)
@@ -138,36 +115,6 @@ def new_search(body: Body, remembered: int) -> Search:
         work=work,
         advance=compiled(advance, body, np.zeros(n), parts_of(()), 0, found, 0, scratch, work),
     )
-
-
-def new_memory(m: int, w: int, n: int) -> Memory:
-    """An empty memory for m obstacles."""
-    return Memory(
-        np.zeros(m, dtype=np.int64),
-        np.zeros((m, w), dtype=np.int64),
-        np.zeros((m, w, n)),
-        np.zeros(1, dtype=np.int64),
-        np.zeros(m, dtype=np.int64),
-        np.zeros(n),
-        np.zeros((m, 7)),
-    )
-
-
-@njit
-def begin_query(memory: Memory, q: Array, parts: Parts) -> None:
-    """Count the query and mark what has moved far since the last one."""
-    first = memory.turn[0] == 0
-    memory.turn[0] += 1
-    robot = 0.0
-    for j in range(q.shape[0]):
-        robot = max(robot, abs(q[j] - memory.q[j]))
-        memory.q[j] = q[j]
-    for o in range(memory.leapt.shape[0]):
-        moved = robot
-        for j in range(7):
-            moved = max(moved, abs(parts.pose[o, j] - memory.pose[o, j]))
-            memory.pose[o, j] = parts.pose[o, j]
-        memory.leapt[o] = 1 if moved > LEAP and not first else 0
 
 
 @njit
@@ -246,7 +193,7 @@ def nearest_contacts(
         # Where there was a contact a moment ago there is one now, as a rule: then the search gives up on none too soon.
         most, thorough, steps = wanted + RETRIES, warm > 0, WARM_STEPS
     _finish_best(body, q, parts, o, search, count, wanted, most, thorough, steps)
-    _remember(memory, o, search, choose(found, count, wanted, choice))
+    keep(memory, o, found, choice, choose(found, count, wanted, choice))
     return choose_distinct(found, count, sheets, choice)
 
 
@@ -381,13 +328,3 @@ def _finish(body: Body, q: Array, parts: Parts, o: int, search: Search, c: int, 
                 found.x[c, j] = q[j]
         evaluate(body, q, parts, o, found, c, search.work)
     found.cost[c] = np.inf
-
-
-@njit
-def _remember(memory: Memory, o: int, search: Search, kept: int) -> None:
-    count = min(kept, memory.piece.shape[1])
-    memory.known[o] = count if count > 0 else NOTHING
-    for i in range(count):
-        c = search.choice.chosen[i]
-        memory.piece[o, i] = search.found.piece[c]
-        copy(search.found.x[c], memory.x[o, i])

@@ -22,8 +22,8 @@ import numpy as np
 
 from cdfctl.fields.kernel.body import Body, body_of
 from cdfctl.fields.kernel.cdf_rows import contact_rows, new_contact_rows, new_workspace
+from cdfctl.fields.kernel.memory import Memory, new_memory
 from cdfctl.fields.kernel.parts import parts_of, turn_obstacles
-from cdfctl.fields.kernel.search import Memory, new_memory
 from cdfctl.fields.kernel.starts import Table, empty_table, new_starts, table_starts
 from cdfctl.fields.table.build import Progress
 from cdfctl.fields.table.contacts import new_tools, point_contacts
