@@ -192,7 +192,7 @@ def nearest_contacts(
         _keep_promising(search, pieces, warm)
         # Where there was a contact a moment ago there is one now, as a rule: then the search gives up on none too soon.
         most, thorough, steps = wanted + RETRIES, warm > 0, WARM_STEPS
-    _finish_best(body, q, parts, o, search, count, wanted, most, thorough, steps)
+    _finish_best(body, q, parts, o, search, count, warm, wanted, most, thorough, steps)
     keep(memory, o, found, choice, choose(found, count, wanted, choice))
     return choose_distinct(found, count, sheets, choice)
 
@@ -245,35 +245,52 @@ def _finish_best(
     o: int,
     search: Search,
     count: int,
+    warm: int,
     wanted: int,
     most: int,
     thorough: bool,
     steps: int,
 ) -> None:
-    """Finish candidates, the most promising first, until ``wanted`` are contacts or ``most`` have been tried.
+    """Finish the ``warm`` remembered contacts, and then other candidates, the most promising first, until ``wanted``
+    are contacts or ``most`` of the others have been tried.
 
-    If ``thorough``, more than ``most`` are tried as long as none was a contact.
-    All others, and those that turn out to be none, get an infinite cost.
+    If ``thorough``, more than ``most`` are tried as long as none was a contact. All that are left, and those that turn
+    out to be none, or one that was found before, get an infinite cost.
     """
     found, choice = search.found, search.choice
+    pieces = body.joint.shape[0]
     unmark(choice, count)
     contacts = 0
-    for tries in range(count):
-        if contacts == wanted or (tries >= most and (contacts > 0 or not thorough)):
-            break
+    for c in range(pieces, pieces + warm):
+        contacts += _finish_new(body, q, parts, o, search, count, c, steps)
+    tries = 0
+    while contacts < wanted and (tries < most or (thorough and contacts == 0)):
         best = cheapest(found, count, choice)
         if best < 0:
             break
-        choice.marked[best] = True
         if like_a_marked(found, count, best, choice):
+            choice.marked[best] = True
             found.cost[best] = np.inf
             continue
-        _finish(body, q, parts, o, search, best, steps)
-        if found.cost[best] < np.inf:
-            contacts += 1
+        contacts += _finish_new(body, q, parts, o, search, count, best, steps)
+        tries += 1
     for c in range(count):
         if not choice.marked[c]:
             found.cost[c] = np.inf
+
+
+@njit
+def _finish_new(body: Body, q: Array, parts: Parts, o: int, search: Search, count: int, c: int, steps: int) -> int:
+    """Finish and mark candidate c; 1 where it is a contact that no marked one is, else 0 and an infinite cost.
+
+    Where another piece penetrates, a candidate slides to that piece's contact: several may end in the same one.
+    """
+    found, choice = search.found, search.choice
+    choice.marked[c] = True
+    _finish(body, q, parts, o, search, c, steps)
+    if like_a_marked(found, count, c, choice):
+        found.cost[c] = np.inf
+    return 1 if found.cost[c] < np.inf else 0
 
 
 @njit
