@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import inf, isfinite, isnan, nan
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +24,7 @@ from cdfctl.control.rows import (
 from cdfctl.control.solvers import TOLERANCE
 from cdfctl.errors import InputError
 from cdfctl.fields.field import Field, make_field
+from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.self_distance import SelfDistance
 from cdfctl.robots.robot import Robot
 from cdfctl.scenario.variants import FieldKind, Variant
@@ -129,7 +131,7 @@ class Core:
         low, high = self._box(q)
         command = self._qp.solve(u_ref, self.u_last, stack([*own, *parts], self.robot.n), low, high)
         self.u_last = command.u.copy()  # the caller may change the one it gets
-        holders = self._holders(command.tight, near, answers, scene)
+        holders = self._holders(command.tight, near, answers, parts, scene)
         return Decision(
             u=command.u,
             h=h,
@@ -162,30 +164,40 @@ class Core:
         return acceleration_box(low, high, below, above, self.u_last, limit, self.dt)
 
     def _holders(
-        self, tight: IntArray, near: SelfQuery | None, answers: Sequence[FieldQuery], scene: Scene
+        self,
+        tight: IntArray,
+        near: SelfQuery | None,
+        answers: Sequence[FieldQuery],
+        parts: Sequence[Rows],
+        scene: Scene,
     ) -> Iterable[str]:
-        """The rows ``tight`` in words, each once; the task's are left out."""
+        """The rows ``tight`` in words, each once; the task's are left out. ``parts`` are as in :meth:`_decide`."""
         found: dict[str, None] = {}
-        start = 0
-        if near is not None and self._own is not None:
+        rows = tight.tolist()  # few, in ascending order
+        if near is not None and self._own is not None and rows:
             pairs = near.pair[near.valid]
-            for row in tight[tight < len(pairs)]:
-                found[" near ".join(self._own.links[pairs[row]])] = None
-            start = len(pairs)
-        for answer in answers:
-            mask = usable(answer)
-            end = start + int(mask.sum())
-            own = tight[(tight >= start) & (tight < end)] - start
-            if own.size:
-                for row in np.flatnonzero(mask)[own]:
-                    found[f"{scene.names[answer.obstacle[row]]} near {self.robot.links[answer.link[row]]}"] = None
-            start = end
+            for row in rows:
+                if row < len(pairs):
+                    found[" near ".join(self._own.links[pairs[row]])] = None
+            rows = [row - len(pairs) for row in rows if row >= len(pairs)]
+        for answer, part in zip(answers, parts, strict=False):  # the task's rows come last
+            count = len(part.rhs)
+            if rows and rows[0] < count:
+                used = np.flatnonzero(usable(answer))
+                for row in rows:
+                    if row < count:
+                        name, link = scene.names[answer.obstacle[used[row]]], answer.link[used[row]]
+                        found[f"{name} near {self.robot.links[link]}"] = None
+            rows = [row - count for row in rows if row >= count]
         return found
 
     def _bounds(self, u: Array, u_ref: Array, low: Array, high: Array) -> Iterable[str]:
         """The joints whose bounds keep ``u`` from ``u_ref``, in words."""
-        held = ((u <= low + TOLERANCE) & (u_ref < u)) | ((u >= high - TOLERANCE) & (u_ref > u))
-        return [f"bound of {self.robot.joint_names[j]}" for j in np.flatnonzero(held)]
+        names, held = self.robot.joint_names, []
+        for name, v, v_ref, least, most in zip(names, *map(Array.tolist, (u, u_ref, low, high)), strict=True):
+            if (v_ref < v <= least + TOLERANCE) or (v_ref > v >= most - TOLERANCE):
+                held.append(f"bound of {name}")
+        return held
 
 
 def core_of(
@@ -205,18 +217,37 @@ def core_of(
 
 def least_barrier(query: FieldQuery, m: int, margin: float) -> Array:
     """h (m,): the least ``d - margin`` over each obstacle's rows, +inf where it has none."""
-    h = np.full(m, np.inf)
-    np.minimum.at(h, query.obstacle, query.d - margin)
+    h = np.empty(m)
+    _least(query.obstacle, query.d, margin, h)
     return h
 
 
 def nearest_contact(query: FieldQuery, m: int) -> Array:
     """(m, n) the contact configuration of each obstacle's nearest row, NaN where it has none."""
-    contact = np.full((m, query.dq.shape[1]), np.nan)
-    for row in np.argsort(-query.d, kind="stable"):  # the nearest comes last and stays
-        if np.isfinite(query.d[row]):
-            contact[query.obstacle[row]] = query.contact_q[row]
+    contact = np.empty((m, query.dq.shape[1]))
+    _nearest(query.obstacle, query.d, query.contact_q, np.empty(m), contact)
     return contact
+
+
+@njit
+def _least(obstacle: IntArray, d: Array, margin: float, h: Array) -> None:
+    h[:] = inf
+    for row in range(d.shape[0]):
+        o = obstacle[row]
+        if d[row] - margin < h[o] or isnan(d[row]):
+            h[o] = d[row] - margin
+
+
+@njit
+def _nearest(obstacle: IntArray, d: Array, contact_q: Array, least: Array, contact: Array) -> None:
+    least[:] = inf
+    contact[:] = nan
+    for row in range(d.shape[0]):
+        o = obstacle[row]
+        if isfinite(d[row]) and d[row] <= least[o]:
+            least[o] = d[row]
+            for j in range(contact.shape[1]):
+                contact[o, j] = contact_q[row, j]
 
 
 def _source(field_name: str, robot: Robot, variant: Variant, p: Parameters, dt: float) -> RowSource:
