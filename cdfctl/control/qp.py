@@ -13,9 +13,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, isfinite, isnan, nan
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -45,13 +46,6 @@ class Command:
     infeasible: bool
     residual: float
     tight: IntArray
-
-
-class _Reach(NamedTuple):
-    """What the box alone says of each row: ``idle`` holds for every u in it, ``hopeless`` for none."""
-
-    idle: BoolArray
-    hopeless: BoolArray
 
 
 class StepQP:
@@ -95,12 +89,11 @@ class StepQP:
         if free.residual == 0.0:
             return free
         x = None
-        reach = _reach(rows, low, high)
-        if not reach.hopeless.any():
-            x = self._solve_all(pull, rows, low, high, ~reach.idle, has_slack)
+        if not _hopeless(rows, low, high).any():
+            x = self._solve_all(pull, rows, low, high, free.tight, has_slack)
         status: DecisionStatus = "optimal"
         if x is None and self._on_infeasible == "least-violation":
-            x = self._solve_least_violation(pull, rows, low, high, has_slack)
+            x = self._solve_least_violation(pull, rows, low, high, free.u, has_slack)
             status = "least-violation"
         if x is None:
             x = np.zeros(self._n + 1)
@@ -140,76 +133,97 @@ class StepQP:
         return lb, ub
 
     def _solve_all(
-        self, pull: Array, rows: Rows, low: Array, high: Array, keep: BoolArray, has_slack: bool
+        self, pull: Array, rows: Rows, low: Array, high: Array, tight: IntArray, has_slack: bool
     ) -> Array | None:
-        G, rhs = rows.G.compress(keep, axis=0), rows.rhs[keep]
-        if not has_slack:
-            return solve(Problem(self._P, -pull, G, rhs, low, high), self._solver)
-        P, q = self._cost(pull, self._n + 1, has_slack)
-        lb, ub = self._bounds(low, high, self._n + 1)
-        return solve(Problem(P, q, np.column_stack((G, -rows.delta[keep])), rhs, lb, ub), self._solver)
+        """The program over (u, delta), which begins with the rows ``tight``."""
+        variables = self._n + has_slack
+        P, q = self._cost(pull, variables, has_slack)
+        lb, ub = self._bounds(low, high, variables)
 
-    def _solve_least_violation(self, pull: Array, rows: Rows, low: Array, high: Array, has_slack: bool) -> Array | None:
-        """The relaxed program over (u, delta, s).
+        def under(needed: IntArray) -> Array | None:
+            G = rows.G[needed]
+            if has_slack:
+                G = np.column_stack((G, -rows.delta[needed]))
+            return solve(Problem(P, q, G, rows.rhs[needed], lb, ub), self._solver)
 
-        What the box decides needs no variable: an idle row is left out, and a hopeless one has ``s_i = G_i u - rhs_i``
-        for every u, so it is a linear cost ``rho G_i u``.
+        return self._under_rows_needed(rows, tight, under, has_slack)
+
+    def _solve_least_violation(
+        self, pull: Array, rows: Rows, low: Array, high: Array, u: Array, has_slack: bool
+    ) -> Array | None:
+        """The relaxed program over (u, delta, s), which begins with the rows that ``u`` violates.
+
+        A hopeless row needs no variable: it has ``s_i = G_i u - rhs_i`` for every u, a linear cost ``rho G_i u``.
         """
         n = self._n
         norm = np.linalg.norm(rows.G, axis=1)
         alive = ~rows.soft | (norm >= FLAT)
         scale = np.where(rows.soft & alive, 1.0 / np.maximum(norm, FLAT), 1.0)[alive]
         G, rhs = rows.G[alive] * scale[:, None], rows.rhs[alive] * scale
-        soft, delta = rows.soft[alive], rows.delta[alive] * scale
-        idle, hopeless = _reach(Rows(G, rhs, soft, delta, ()), low, high)
-        linear = hopeless & soft
-        keep = ~(idle | linear)
-        relaxed = np.nonzero(soft[keep])[0]
+        scaled = Rows(G, rhs, rows.soft[alive], rows.delta[alive] * scale, ())
+        linear = _hopeless(scaled, low, high) & scaled.soft
+        rest = Rows(G[~linear], rhs[~linear], scaled.soft[~linear], scaled.delta[~linear], ())
+        towards = pull - self._rho * G[linear].sum(axis=0)
 
-        own = n + has_slack
-        variables = own + relaxed.shape[0]
-        P, q = self._cost(pull, variables, has_slack)
-        q[:n] += self._rho * G[linear].sum(axis=0)
-        q[own:] = self._rho
-        A = np.zeros((int(keep.sum()), variables))
-        A[:, :n] = G[keep]
-        if has_slack:
-            A[:, n] = -delta[keep]
-        A[relaxed, np.arange(own, variables)] = -1.0
-        lb, ub = self._bounds(low, high, variables)
-        return solve(Problem(P, q, A, rhs[keep], lb, ub), self._solver)
+        def under(needed: IntArray) -> Array | None:
+            relaxed = rest.soft[needed].nonzero()[0]
+            own = n + has_slack
+            variables = own + len(relaxed)
+            P, q = self._cost(towards, variables, has_slack)
+            q[own:] = self._rho
+            A = np.zeros((len(needed), variables))
+            A[:, :n] = rest.G[needed]
+            if has_slack:
+                A[:, n] = -rest.delta[needed]
+            A[relaxed, np.arange(own, variables)] = -1.0
+            lb, ub = self._bounds(low, high, variables)
+            return solve(Problem(P, q, A, rest.rhs[needed], lb, ub), self._solver)
+
+        return self._under_rows_needed(rest, (rest.G @ u > rest.rhs).nonzero()[0], under, has_slack)
+
+    def _under_rows_needed(
+        self, rows: Rows, first: IntArray, under: Callable[[IntArray], Array | None], has_slack: bool
+    ) -> Array | None:
+        """The optimum x under all ``rows``, by ``under``, which finds it under those of some indices.
+
+        Fewer rows leave more to choose from: what is best under some of them, and satisfies the others, is best under
+        all; and where some have no solution, all have none. So it begins with ``first`` and adds what the answer
+        violates until it violates nothing, which is after one turn a row at the latest. In the relaxed program a row
+        that is satisfied has ``s_i = 0`` and costs nothing: the same holds.
+        """
+        n, excess = self._n, np.empty(len(rows.rhs))
+        needed = np.zeros(len(rows.rhs), dtype=np.bool_)
+        needed[first] = True
+        while True:
+            x = under(needed.nonzero()[0])
+            if x is None:
+                return None
+            _mark_excess(rows.G, rows.rhs, rows.delta, x[:n], float(x[n]) if has_slack else 0.0, excess)
+            violated = (excess > TOLERANCE) & ~needed
+            if not np.count_nonzero(violated):
+                return x
+            needed |= violated
 
 
-def _reach(rows: Rows, low: Array, high: Array) -> _Reach:
-    """Compare each row with its least and greatest value over the box, by interval arithmetic.
+def _hopeless(rows: Rows, low: Array, high: Array) -> BoolArray:
+    """Mask (k,) of the rows that no u of the box satisfies, beyond the solver's tolerance: no solver need be asked.
 
-    With ``G_i u = sum_j G_ij u_j`` and ``low <= u <= high``, each term is least at one bound of its joint and greatest
-    at the other, and the joints are independent: the sums of these are the least and the greatest value itself. So an
-    ``idle`` row, whose greatest is at most its rhs, holds for every u the program may choose: with or without it the
-    optimum is the same. ``hopeless`` is a proof that no u satisfies the row (beyond the solver's tolerance), so no
-    solver need be asked. A row with the Lyapunov slack is neither.
+    The least of ``G_i u = sum_j G_ij u_j`` over ``low <= u <= high`` is the sum of each term's least, which is at one
+    of its joint's bounds. A row with the Lyapunov slack is never hopeless.
     """
-    reach = _Reach(*np.empty((2, len(rows.rhs)), dtype=np.bool_))
-    _mark_reach(rows.G, rows.rhs, rows.delta, low, high, *reach)
-    return reach
+    mask = np.empty(len(rows.rhs), dtype=np.bool_)
+    _mark_hopeless(rows.G, rows.rhs, rows.delta, low, high, mask)
+    return mask
 
 
 @njit
-def _mark_reach(
-    G: Array, rhs: Array, delta: Array, low: Array, high: Array, idle: BoolArray, hopeless: BoolArray
-) -> None:
+def _mark_hopeless(G: Array, rhs: Array, delta: Array, low: Array, high: Array, mask: BoolArray) -> None:
     for row in range(rhs.shape[0]):
-        least, greatest = 0.0, 0.0
+        least = 0.0
         for j in range(low.shape[0]):
-            if G[row, j] > 0.0:
-                least += G[row, j] * low[j]
-                greatest += G[row, j] * high[j]
-            elif G[row, j] < 0.0:  # and 0 times an infinite bound is 0
-                least += G[row, j] * high[j]
-                greatest += G[row, j] * low[j]
-        hard = delta[row] == 0.0
-        idle[row] = hard and greatest <= rhs[row]
-        hopeless[row] = hard and (least > rhs[row] + TOLERANCE or rhs[row] == -inf)
+            if G[row, j] != 0.0:  # 0 times an infinite bound is 0
+                least += G[row, j] * (low[j] if G[row, j] > 0.0 else high[j])
+        mask[row] = delta[row] == 0.0 and (least > rhs[row] + TOLERANCE or rhs[row] == -inf)
 
 
 @njit
