@@ -86,14 +86,15 @@ class StepQP:
         pull = self._R * u_ref + self._S * u_last
         has_slack = bool(np.count_nonzero(rows.delta))
         free = self._command(pull / self._weight, 0.0 if has_slack else nan, rows, low, high, "optimal")
-        if free.residual == 0.0:
+        if free.residual <= TOLERANCE:
             return free
+        start = np.append(free.u, 0.0)
         x = None
         if not _hopeless(rows, low, high).any():
-            x = self._solve_all(pull, rows, low, high, free.tight, has_slack)
+            x = self._solve_all(pull, rows, low, high, start, has_slack)
         status: DecisionStatus = "optimal"
         if x is None and self._on_infeasible == "least-violation":
-            x = self._solve_least_violation(pull, rows, low, high, free.u, has_slack)
+            x = self._solve_least_violation(pull, rows, low, high, start, has_slack)
             status = "least-violation"
         if x is None:
             x = np.zeros(self._n + 1)
@@ -133,9 +134,9 @@ class StepQP:
         return lb, ub
 
     def _solve_all(
-        self, pull: Array, rows: Rows, low: Array, high: Array, tight: IntArray, has_slack: bool
+        self, pull: Array, rows: Rows, low: Array, high: Array, start: Array, has_slack: bool
     ) -> Array | None:
-        """The program over (u, delta), which begins with the rows ``tight``."""
+        """The program over (u, delta)."""
         variables = self._n + has_slack
         P, q = self._cost(pull, variables, has_slack)
         lb, ub = self._bounds(low, high, variables)
@@ -146,12 +147,12 @@ class StepQP:
                 G = np.column_stack((G, -rows.delta[needed]))
             return solve(Problem(P, q, G, rows.rhs[needed], lb, ub), self._solver)
 
-        return self._under_rows_needed(rows, tight, under, has_slack)
+        return self._under_rows_needed(rows, start, under, has_slack)
 
     def _solve_least_violation(
-        self, pull: Array, rows: Rows, low: Array, high: Array, u: Array, has_slack: bool
+        self, pull: Array, rows: Rows, low: Array, high: Array, start: Array, has_slack: bool
     ) -> Array | None:
-        """The relaxed program over (u, delta, s), which begins with the rows that ``u`` violates.
+        """The relaxed program over (u, delta, s).
 
         A hopeless row needs no variable: it has ``s_i = G_i u - rhs_i`` for every u, a linear cost ``rho G_i u``.
         """
@@ -179,30 +180,33 @@ class StepQP:
             lb, ub = self._bounds(low, high, variables)
             return solve(Problem(P, q, A, rest.rhs[needed], lb, ub), self._solver)
 
-        return self._under_rows_needed(rest, (rest.G @ u > rest.rhs).nonzero()[0], under, has_slack)
+        return self._under_rows_needed(rest, start, under, has_slack)
 
     def _under_rows_needed(
-        self, rows: Rows, first: IntArray, under: Callable[[IntArray], Array | None], has_slack: bool
+        self, rows: Rows, start: Array, under: Callable[[IntArray], Array | None], has_slack: bool
     ) -> Array | None:
         """The optimum x under all ``rows``, by ``under``, which finds it under those of some indices.
 
         Fewer rows leave more to choose from: what is best under some of them, and satisfies the others, is best under
-        all; and where some have no solution, all have none. So it begins with ``first`` and adds what the answer
-        violates until it violates nothing, which is after one turn a row at the latest. In the relaxed program a row
-        that is satisfied has ``s_i = 0`` and costs nothing: the same holds.
+        all; and where some have no solution, all have none. So it begins with the rows that ``start`` violates, and
+        adds those that the answer violates until there are none, the n worst at a time, as each relaxed one is a
+        variable more: after one turn a row at the latest. In the relaxed program a row that is satisfied has
+        ``s_i = 0`` and costs nothing: the same holds.
         """
-        n, excess = self._n, np.empty(len(rows.rhs))
-        needed = np.zeros(len(rows.rhs), dtype=np.bool_)
-        needed[first] = True
+        n, x = self._n, start
+        excess, needed = np.empty(len(rows.rhs)), np.zeros(len(rows.rhs), dtype=np.bool_)
         while True:
-            x = under(needed.nonzero()[0])
-            if x is None:
-                return None
             _mark_excess(rows.G, rows.rhs, rows.delta, x[:n], float(x[n]) if has_slack else 0.0, excess)
-            violated = (excess > TOLERANCE) & ~needed
-            if not np.count_nonzero(violated):
+            violated = ((excess > TOLERANCE) & ~needed).nonzero()[0]
+            if x is not start and not len(violated):
                 return x
-            needed |= violated
+            if x is not start and len(violated) > n:
+                violated = violated[np.argpartition(-excess[violated], n)[:n]]
+            needed[violated] = True
+            answer = under(needed.nonzero()[0])
+            if answer is None:
+                return None
+            x = answer
 
 
 def _hopeless(rows: Rows, low: Array, high: Array) -> BoolArray:
