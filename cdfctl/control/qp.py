@@ -136,10 +136,11 @@ class StepQP:
     def _solve_all(
         self, pull: Array, rows: Rows, low: Array, high: Array, start: Array, has_slack: bool
     ) -> Array | None:
-        """The program over (u, delta)."""
-        variables = self._n + has_slack
-        P, q = self._cost(pull, variables, has_slack)
-        lb, ub = self._bounds(low, high, variables)
+        """The program over (u, delta), or over u alone without a Lyapunov row."""
+        P, q, lb, ub = self._P, -pull, low, high
+        if has_slack:
+            P, q = self._cost(pull, self._n + 1, has_slack)
+            lb, ub = self._bounds(low, high, self._n + 1)
 
         def under(needed: IntArray) -> Array | None:
             G = rows.G[needed]
