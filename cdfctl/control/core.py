@@ -173,7 +173,9 @@ class Core:
         """The rows ``tight`` in words, each once; the task's are left out. ``parts`` are as in :meth:`_decide`."""
         found: dict[str, None] = {}
         rows = tight.tolist()  # few, in ascending order
-        if near is not None and self._own is not None and rows:
+        if not rows:
+            return found
+        if near is not None and self._own is not None:
             pairs = near.pair[near.valid]
             for row in rows:
                 if row < len(pairs):
