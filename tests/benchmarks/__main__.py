@@ -1,8 +1,9 @@
-"""All benchmarks of speed by one command: ``python tests/benchmarks [--cpu] [GROUP …]``.
+"""All benchmarks of speed by one command: ``python tests/benchmarks [--cpu] [--markdown] [GROUP …]``.
 
 The groups are filter, cdf, sdf, obstacles, joints and start; all of them without a name. It prints a table with goals
-and the ratio to the first recorded run of this machine, and keeps a record in ``.benchmarks`` beside the tests. The
-plants have scripts of their own, ``bench_mujoco.py`` and ``bench_franka.py``. None of this is collected by pytest.
+and the ratio to the first recorded run of this machine, and keeps a record in ``.benchmarks`` beside the tests; with
+``--markdown`` it ends with the tables of ``docs/performance.md``. The plants have scripts of their own,
+``bench_mujoco.py`` and ``bench_franka.py``. None of this is collected by pytest.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import bench_filter
 import bench_growth
 import bench_sdf
 import bench_start
+import pages
 from timing import Measurement, record, show
 
 from cdfctl import load_robot
@@ -32,12 +34,14 @@ GROUPS: dict[str, Callable[[], Iterator[Measurement]]] = {
 
 def main() -> None:
     """Measure, print, record."""
-    names = [argument for argument in sys.argv[1:] if argument != "--cpu"]
+    names = [argument for argument in sys.argv[1:] if argument not in ("--cpu", "--markdown")]
     unknown = [name for name in names if name not in GROUPS]
     if unknown:
-        sys.exit(f"no benchmark '{unknown[0]}'; there are {', '.join(GROUPS)}, and --cpu")
+        sys.exit(f"no benchmark '{unknown[0]}'; there are {', '.join(GROUPS)}, and --cpu and --markdown")
     done = show(chain.from_iterable(GROUPS[name]() for name in names or GROUPS))
     bench_growth.show_laws(done)
+    if "--markdown" in sys.argv:
+        print(pages.tables(done))
     print(f"recorded in {record(done)}")
 
 

@@ -51,13 +51,13 @@ def along(field: CDF, runs: list[list[tuple[Array, Scene]]], sheets: int) -> Arr
 
 def cold(field: CDF, robot: Robot) -> Array:
     """Times of first queries of one ball, anywhere in the workspace, a tenth of the time out of reach."""
-    rng, times = np.random.default_rng(0), []
+    rng, times, p = np.random.default_rng(0), [], np.zeros((1, 3))
+    ball = moving(lambda t: (p, np.zeros((1, 3))))
     for _ in range(COLD):
-        p = rng.uniform(*WORKSPACE, (1, 3))
-        scene = moving(lambda t, p=p: (p, np.zeros((1, 3))))(0.0)
+        p[:] = rng.uniform(*WORKSPACE, (1, 3))
         q = robot.home + rng.normal(0.0, 0.4, robot.n)
         field.reset()
-        times.append(timed(partial(field.query, q, scene))[0])
+        times.append(timed(partial(field.query, q, ball(0.0)))[0])
     return np.array(times)
 
 
