@@ -38,9 +38,14 @@ def as_vector(value: ArrayLike, size: int | None, name: str) -> Array:
     if array.ndim != 1 or (size is not None and array.shape[0] != size):
         expected = "numbers" if size is None else f"{size} numbers"
         raise InputError(f"{name} must have {expected}, found shape {array.shape}")
-    if not np.all(np.isfinite(array)):
-        raise InputError(f"{name} must be finite, found {array.tolist()}")
+    check_finite(array, name)
     return array
+
+
+def check_finite(array: Array, name: str) -> None:
+    """Raise :class:`InputError` where a number of ``array`` is NaN or infinite."""
+    if not np.isfinite(array).all():
+        raise InputError(f"{name} must be finite, found {array.tolist()}")
 
 
 def _positive(value: float, name: str, *, allow_zero: bool = False) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cdfctl.control.nearest import least_barrier, nearest_contact
 from cdfctl.control.parameters import Parameters
 from cdfctl.control.qp import StepQP
 from cdfctl.control.rows import (
@@ -129,7 +130,7 @@ class Core:
         low, high = self._box(q)
         command = self._qp.solve(u_ref, self.u_last, stack([*own, *parts], self.robot.n), low, high)
         self.u_last = command.u.copy()  # the caller may change the one it gets
-        holders = self._holders(command.tight, near, answers, scene)
+        holders = self._holders(command.tight, near, answers, parts, scene)
         return Decision(
             u=command.u,
             h=h,
@@ -162,30 +163,42 @@ class Core:
         return acceleration_box(low, high, below, above, self.u_last, limit, self.dt)
 
     def _holders(
-        self, tight: IntArray, near: SelfQuery | None, answers: Sequence[FieldQuery], scene: Scene
+        self,
+        tight: IntArray,
+        near: SelfQuery | None,
+        answers: Sequence[FieldQuery],
+        parts: Sequence[Rows],
+        scene: Scene,
     ) -> Iterable[str]:
-        """The rows ``tight`` in words, each once; the task's are left out."""
+        """The rows ``tight`` in words, each once; the task's are left out. ``parts`` are as in :meth:`_decide`."""
         found: dict[str, None] = {}
-        start = 0
+        rows = tight.tolist()  # few, in ascending order
+        if not rows:
+            return found
         if near is not None and self._own is not None:
             pairs = near.pair[near.valid]
-            for row in tight[tight < len(pairs)]:
-                found[" near ".join(self._own.links[pairs[row]])] = None
-            start = len(pairs)
-        for answer in answers:
-            mask = usable(answer)
-            end = start + int(mask.sum())
-            own = tight[(tight >= start) & (tight < end)] - start
-            if own.size:
-                for row in np.flatnonzero(mask)[own]:
-                    found[f"{scene.names[answer.obstacle[row]]} near {self.robot.links[answer.link[row]]}"] = None
-            start = end
+            for row in rows:
+                if row < len(pairs):
+                    found[" near ".join(self._own.links[pairs[row]])] = None
+            rows = [row - len(pairs) for row in rows if row >= len(pairs)]
+        for answer, part in zip(answers, parts, strict=False):  # the task's rows come last
+            count = len(part.rhs)
+            if rows and rows[0] < count:
+                used = np.flatnonzero(usable(answer))
+                for row in rows:
+                    if row < count:
+                        name, link = scene.names[answer.obstacle[used[row]]], answer.link[used[row]]
+                        found[f"{name} near {self.robot.links[link]}"] = None
+            rows = [row - count for row in rows if row >= count]
         return found
 
     def _bounds(self, u: Array, u_ref: Array, low: Array, high: Array) -> Iterable[str]:
         """The joints whose bounds keep ``u`` from ``u_ref``, in words."""
-        held = ((u <= low + TOLERANCE) & (u_ref < u)) | ((u >= high - TOLERANCE) & (u_ref > u))
-        return [f"bound of {self.robot.joint_names[j]}" for j in np.flatnonzero(held)]
+        names, held = self.robot.joint_names, []
+        for name, v, v_ref, least, most in zip(names, *map(Array.tolist, (u, u_ref, low, high)), strict=True):
+            if (v_ref < v <= least + TOLERANCE) or (v_ref > v >= most - TOLERANCE):
+                held.append(f"bound of {name}")
+        return held
 
 
 def core_of(
@@ -201,22 +214,6 @@ def core_of(
 
         return PredictiveCore(robot, variant, parameters, dt, known)
     return Core(robot, variant, parameters, dt)
-
-
-def least_barrier(query: FieldQuery, m: int, margin: float) -> Array:
-    """h (m,): the least ``d - margin`` over each obstacle's rows, +inf where it has none."""
-    h = np.full(m, np.inf)
-    np.minimum.at(h, query.obstacle, query.d - margin)
-    return h
-
-
-def nearest_contact(query: FieldQuery, m: int) -> Array:
-    """(m, n) the contact configuration of each obstacle's nearest row, NaN where it has none."""
-    contact = np.full((m, query.dq.shape[1]), np.nan)
-    for row in np.argsort(-query.d, kind="stable"):  # the nearest comes last and stays
-        if np.isfinite(query.d[row]):
-            contact[query.obstacle[row]] = query.contact_q[row]
-    return contact
 
 
 def _source(field_name: str, robot: Robot, variant: Variant, p: Parameters, dt: float) -> RowSource:

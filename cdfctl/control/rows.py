@@ -32,9 +32,9 @@ def tvcbf_rows(query: FieldQuery, alpha: float, margin: float) -> Rows:
 
     Source: the paper's TVCBF condition for the single integrator.
     """
-    k = usable(query)
-    h = query.d[k] - margin
-    return _soft_rows("tvcbf", -query.dq[k], alpha * h + query.dt[k])
+    d, dq, dt = _used(query)
+    h = d - margin
+    return _soft_rows("tvcbf", -dq, alpha * h + dt)
 
 
 def cbf_rows(query: FieldQuery, alpha: float, margin: float) -> Rows:
@@ -44,9 +44,9 @@ def cbf_rows(query: FieldQuery, alpha: float, margin: float) -> Rows:
 
     Args as in :func:`tvcbf_rows`.
     """
-    k = usable(query)
-    h = query.d[k] - margin
-    return _soft_rows("cbf", -query.dq[k], alpha * h)
+    d, dq, _ = _used(query)
+    h = d - margin
+    return _soft_rows("cbf", -dq, alpha * h)
 
 
 def hyperplane_rows(query: FieldQuery, offset: float, dt: float) -> Rows:
@@ -64,11 +64,11 @@ def hyperplane_rows(query: FieldQuery, offset: float, dt: float) -> Rows:
 
     Source: the paper's separating-hyperplane baseline.
     """
-    k = usable(query)
-    argument = query.d[k] + offset
+    d, dq, _ = _used(query)
+    argument = d + offset
     logarithm = np.full(argument.shape, -np.inf)
     np.log(argument, out=logarithm, where=argument > 0.0)
-    return _soft_rows("hyperplane", -query.dq[k] * dt, logarithm)
+    return _soft_rows("hyperplane", -dq * dt, logarithm)
 
 
 def self_collision_rows(query: SelfQuery, alpha: float, margin: float) -> Rows:
@@ -199,6 +199,14 @@ def stack(parts: Sequence[Rows], n: int) -> Rows:
         delta=np.concatenate([p.delta for p in parts]),
         names=sum((p.names for p in parts), ()),
     )
+
+
+def _used(query: FieldQuery) -> tuple[Array, Array, Array]:
+    """Distance and derivatives, (k,), (k, n), (k,), of the usable rows; no copies where all are."""
+    mask = usable(query)
+    if np.count_nonzero(mask) == len(mask):
+        return query.d, query.dq, query.dt
+    return query.d[mask], query.dq.compress(mask, axis=0), query.dt[mask]
 
 
 def _soft_rows(name: str, G: Array, rhs: Array) -> Rows:

@@ -13,7 +13,7 @@ from cdfctl.control.parameters import Parameters, config_of, resolved
 from cdfctl.errors import InputError, unknown_name
 from cdfctl.robots.robot import Robot
 from cdfctl.scenario.variants import DEFAULT_VARIANT
-from cdfctl.types import Array, Decision, Scene, as_vector
+from cdfctl.types import Array, Decision, Scene, as_vector, check_finite
 
 OnBadInput = Literal["error", "brake"]
 
@@ -108,7 +108,7 @@ class SafetyFilter:
         vectors = {name: _vector(value, n, name) for name, value in given.items()}
         try:
             for name, vector in vectors.items():
-                as_vector(vector, n, name)
+                check_finite(vector, name)
             if u_last is not None:
                 self._core.u_last = vectors["u_last"]
             nominal = np.minimum(np.maximum(vectors["u_nominal"], -self._most), self._most)
