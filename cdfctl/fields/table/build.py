@@ -184,9 +184,11 @@ def _is_chunk(arrays: dict[str, NDArray[Any]], points: int, body: Body) -> bool:
         return False
     count, q = arrays["count"], arrays["q"]
     return (
-        (count.dtype, count.shape) == (np.int16, (points, len(body.joint)))
+        count.dtype == np.int16
+        and count.shape == (points, len(body.joint))
         and bool(np.all((count >= 0) & (count <= MOST)))
-        and (q.dtype, q.shape) == (np.float32, (int(count.sum()), len(body.chain.parent)))
+        and q.dtype == np.float32
+        and q.shape == (int(count.sum()), len(body.chain.parent))
         and bool(np.isfinite(q).all())
     )
 
