@@ -10,6 +10,7 @@ import fcntl
 import json
 import os
 import random
+import resource
 import shutil
 import sys
 from collections.abc import Callable, Iterator
@@ -34,6 +35,7 @@ simulation: {dt: 0.05, time_limit: 0.4}
 assumptions:
   - Made for a test.
 """
+MEMORY = 6 * 2**30
 SDF = "sdf-tvcbf-qp"
 BENCH = ["bench", "--scenario", "./small.yaml", "--controller", SDF, "--controller", "sdf-cbf-qp"]
 BENCH += ["--trials", "3", "--jobs", "1", "--keep", "all", "--quiet"]
@@ -184,6 +186,7 @@ def damaged(kind: str, rng: random.Random) -> tuple[str, str]:
 
 def loop(seed: int, count: int) -> None:
     make()
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))  # what a reader asks for beyond it is an error, not a swap
     begin("bad")
     whole = Path("good/table/planar.safetensors").read_bytes()
     trials = Path("good/store/trials.jsonl").read_bytes()
