@@ -57,7 +57,7 @@ def write_file(path: Path, arrays: Arrays, metadata: Mapping[str, str]) -> None:
             os.fsync(file.fileno())
         beside.replace(path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+        raise InputError(f"{path}: cannot be written: {error.strerror}", "give another --out, or make room") from None
     finally:
         if beside.parent.is_dir():
             beside.unlink(missing_ok=True)
