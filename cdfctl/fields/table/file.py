@@ -12,6 +12,7 @@ import json
 import os
 import struct
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +60,7 @@ def write_file(path: Path, arrays: Arrays, metadata: Mapping[str, str]) -> None:
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}", "give another --out, or make room") from None
     finally:
-        if beside.parent.is_dir():
+        with suppress(OSError):
             beside.unlink(missing_ok=True)
 
 
