@@ -77,7 +77,7 @@ def make() -> None:
         Path(path).mkdir(parents=True)
     words = [["run", "./small.yaml", "--out", "good/run", "--quiet"], [*BENCH, "--out", "good/store"]]
     words += [[*BUILD, "--out", "good/table/planar.safetensors"]]
-    words += [["plot", "good/run", *PLOT], ["plot", "good/store", *PLOT], ["view", "good/run", "--html", "page.html"]]
+    words += [["plot", "good/run", "--figure", "time", "--figure", "task-space", *PLOT], ["plot", "good/store", *PLOT], ["view", "good/run", "--html", "page.html"]]
     for command in words:
         answer = one(command)
         assert answer["status"] in (0, 1), answer
