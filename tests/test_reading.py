@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from cdfctl.errors import InputError
@@ -50,3 +51,14 @@ def test_devices_and_pipes_are_refused(tmp_path: Path) -> None:
             path.symlink_to(source)
             with pytest.raises(InputError, match="not a regular file"):
                 reader(path)
+
+
+def test_points_are_never_unpickled(tmp_path: Path) -> None:
+    class Evil:
+        def __reduce__(self) -> tuple[object, ...]:
+            return Path.touch, (tmp_path / "pwned",)
+
+    np.save(tmp_path / "a.npy", np.array([Evil()], dtype=object), allow_pickle=True)
+    with pytest.raises(InputError, match="not a file of points"):
+        load_points(tmp_path / "a.npy")
+    assert not (tmp_path / "pwned").exists()

@@ -203,6 +203,7 @@ def test_a_broken_mesh_is_named_without_our_stack(tmp_path, write_urdf, xml):
         (b'<?xml version="1.0" encoding="foo"?><robot/>', "not readable as XML"),
         (b"<sdf/>", "the root element is <sdf>, a URDF has <robot>"),
         (b'<!DOCTYPE a [<!ENTITY a "b">]><robot/>', "XML entities"),
+        ('<!DOCTYPE a [<!ENTITY a "b">]><robot/>'.encode("utf-16"), "XML entities"),
         (b'<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arm/></robot>', "contains xacro elements"),
     ],
 )
