@@ -82,6 +82,7 @@ def make() -> None:
     for command in words:
         answer = one(command)
         assert answer["status"] in (0, 1), answer
+    assert "<img src=x" not in Path("page.html").read_text()  # the obstacle's name
     make_partial()
     make_live()
 
