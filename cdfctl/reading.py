@@ -1,7 +1,7 @@
-"""Files that others may have written, read with care.
+"""Files that others may have written, read and replaced with care.
 
 A pipe or a device in the place of a file would hang a command or fill the memory: only regular files are read, and no
-more of them than the reader has use for.
+more of them than the reader has use for. A link in the place of a draft would lead what is written to another file.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ def check_regular(path: Path) -> None:
     """Raise :class:`OSError` where ``path`` is no regular file; symbolic links are followed."""
     mode = path.stat().st_mode
     if stat.S_ISDIR(mode):
-        raise IsADirectoryError(errno.EISDIR, "is a directory", str(path))
+        raise IsADirectoryError(errno.EISDIR, "Is a directory", str(path))
     if not stat.S_ISREG(mode):
-        raise OSError(errno.EINVAL, "is not a regular file", str(path))
+        raise OSError(errno.EINVAL, "Not a regular file", str(path))
 
 
 def read_bytes(path: Path, most: int = MOST) -> bytes:
@@ -32,7 +32,7 @@ def read_bytes(path: Path, most: int = MOST) -> bytes:
     with path.open("rb") as file:
         data = file.read(most + 1)
     if len(data) > most:
-        raise OSError(errno.EFBIG, f"is larger than {most // MIB} MiB", str(path))
+        raise OSError(errno.EFBIG, f"Larger than {most // MIB} MiB", str(path))
     return data
 
 
@@ -52,3 +52,16 @@ def parse_json(text: str) -> Any:
         return json.loads(text)
     except RecursionError:
         raise ValueError("nested too deeply") from None
+
+
+def make_way(draft: Path) -> Path:
+    """``draft``, a name about to be written to, with whatever stood there removed. Raises :class:`OSError`."""
+    if draft.is_symlink() or draft.exists():
+        draft.unlink()
+    return draft
+
+
+def refuse_link(path: Path) -> None:
+    """Raise :class:`OSError` where ``path`` is a symbolic link: for files that are ours to change in place."""
+    if path.is_symlink():
+        raise OSError(errno.ELOOP, "Is a symbolic link", str(path))

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from cdfctl.errors import InputError
-from cdfctl.reading import MIB, parse_json, read_bytes
+from cdfctl.reading import MIB, make_way, parse_json, read_bytes, refuse_link
 from cdfctl.types import TrialKey
 
 Record = dict[str, Any]
@@ -103,7 +103,8 @@ def drop_torn(path: Path) -> None:
         InputError: it cannot be read or written.
     """
     try:
-        if not os.path.lexists(path):
+        refuse_link(path)
+        if not path.exists():
             return
         data = read_bytes(path, MOST)
         whole = data.rfind(b"\n") + 1
@@ -135,7 +136,7 @@ def replace(path: Path, text: str) -> None:
     """Write a file whole or not at all. Raises :class:`InputError`."""
     draft = path.with_name(f".{path.name}.new")
     try:
-        draft.write_text(text, encoding="utf-8")
+        make_way(draft).write_text(text, encoding="utf-8")
         draft.replace(path)
     except OSError as error:
         unlink(draft)

@@ -42,7 +42,7 @@ from cdfctl.benchmark.plan import Plan, digest
 from cdfctl.benchmark.trial import Answer, record_of, timing_of
 from cdfctl.benchmark.versions import versions
 from cdfctl.errors import InputError
-from cdfctl.reading import read_json
+from cdfctl.reading import read_json, refuse_link
 from cdfctl.simulation.run_folder import write_run
 from cdfctl.types import TrialKey
 
@@ -156,7 +156,10 @@ def open_store(folder: Path, plan: Plan) -> Iterator[Store]:
         _check_ours(folder, plan)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        lock = (folder / LOCK).open("a")
+        for name in (LOCK, "trajectories"):
+            refuse_link(folder / name)
+        # For reading too: where it is a pipe, that does not wait for somebody else.
+        lock = os.fdopen(os.open(folder / LOCK, os.O_CREAT | os.O_RDWR, 0o666), "rb")
     except OSError as error:
         raise unwritable(folder, error) from None
     with lock:

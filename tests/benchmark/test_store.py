@@ -171,6 +171,23 @@ def test_a_line_that_no_bench_writes_is_refused(here: Path, plan: Plan, change: 
         peek(here / "a", plan)
 
 
+@pytest.mark.parametrize("name", ["trials.jsonl", "timing.jsonl", ".lock", "trajectories", ".manifest.json.new"])
+def test_a_link_in_a_store_leads_nothing_astray(here: Path, plan: Plan, name: str) -> None:
+    """A torn last line is cut off and drafts are written: not those of a file somewhere else."""
+    given = answers(plan)[:1]
+    fill(here / "a", plan, given)
+    theirs = here / "theirs"
+    theirs.write_text("no line feed at the end")
+    (here / "a" / name).unlink(missing_ok=True)
+    (here / "a" / name).symlink_to(theirs)
+    if name == ".manifest.json.new":
+        fill(here / "a", plan, [])
+    else:
+        with pytest.raises(InputError, match="Is a symbolic link"):
+            fill(here / "a", plan, [])
+    assert theirs.read_text() == "no line feed at the end"
+
+
 def test_one_bench_at_a_time(here: Path, plan: Plan) -> None:
     with (
         open_store(here / "a", plan),

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from cdfctl.errors import CdfctlError, InputError
 from cdfctl.fields.table.file import read_file, write_file
+from cdfctl.reading import make_way, read_bytes
 
 
 class PartialBuild:
@@ -56,10 +57,10 @@ class PartialBuild:
 
     def _tidy(self) -> None:
         key_file = self.folder / "key"
-        if not key_file.exists() or key_file.read_text(errors="replace") != self._key:
+        if not key_file.exists() or read_bytes(key_file) != self._key.encode():
             for path in self.folder.glob("*.chunk"):
                 path.unlink()
-            key_file.write_text(self._key)
+            make_way(key_file).write_text(self._key)
         for path in self.folder.glob(".*.tmp"):  # of a build that was killed
             path.unlink()
 
