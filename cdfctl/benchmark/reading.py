@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cdfctl.benchmark.lines import TIMES, TRIAL, Record, read_lines
+from cdfctl.benchmark.lines import TIMES, TRIAL, Record, key_of, read_lines
 from cdfctl.benchmark.plan import Cell
 from cdfctl.benchmark.statistics import CellSummary, summarise
 from cdfctl.benchmark.store import FORMAT, MANIFEST, TIMING, TRIALS, VERSION
@@ -57,6 +57,8 @@ def read_store(folder: Path) -> StoredBench:
     except (KeyError, TypeError, ValueError, AttributeError, CdfctlError):
         raise InputError(f"{path}: damaged: not the manifest of a benchmark", AGAIN) from None
     records = read_lines(folder / TRIALS, TRIAL)
+    if len({key_of(record) for record in records}) != len(records):
+        raise InputError(f"{folder / TRIALS}: damaged: a trial comes twice", AGAIN)
     try:
         timings = read_lines(folder / TIMING, TIMES)
         summaries = summarise(cells, records, timings)

@@ -16,6 +16,7 @@ process at a time: a lock that its death releases.
 from __future__ import annotations
 
 import fcntl
+import itertools
 import json
 import os
 from collections.abc import Iterator, Mapping
@@ -227,12 +228,17 @@ def _check_versions(folder: Path, theirs: object) -> None:
 
 
 def _read(folder: Path, keys: list[TrialKey]) -> tuple[list[Record], dict[TrialKey, Record]]:
-    """The finished trials of a store; ``trials.jsonl`` has to follow the plan as far as both go."""
+    """The finished trials of a store; ``trials.jsonl`` has to follow the plan, and no trial comes twice."""
     records = read_lines(folder / TRIALS, TRIAL)
-    for line, (record, key) in enumerate(zip(records, keys, strict=False), start=1):
-        if key_of(record) != key:
+    seen: set[TrialKey] = set()
+    for line, (record, key) in enumerate(itertools.zip_longest(records, keys), start=1):
+        if record is None:
+            break
+        # Beyond the plan there may be what was asked for before, when it had more trials.
+        if (key is not None and key_of(record) != key) or key_of(record) in seen:
             place = f"{folder / TRIALS}:{line}"
             raise InputError(f"{place}: damaged: not the trial that belongs there", AGAIN)
+        seen.add(key_of(record))
     wanted = set(keys[len(records) :])
     early = {key_of(record): record for record in read_lines(folder / ARRIVED, TRIAL)}
     return records, {key: record for key, record in early.items() if key in wanted}

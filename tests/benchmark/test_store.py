@@ -11,6 +11,7 @@ import pytest
 
 from cdfctl.benchmark import lines
 from cdfctl.benchmark.plan import Plan, make_plan
+from cdfctl.benchmark.reading import read_store
 from cdfctl.benchmark.run import Runner
 from cdfctl.benchmark.store import default_store, folder_name, open_store, peek
 from cdfctl.benchmark.trial import Answer, run_trial
@@ -131,6 +132,11 @@ def test_damage_inside_is_named_by_its_line(here: Path, plan: Plan) -> None:
     path.write_bytes(b"".join([whole[0], b"{]\n", *whole[2:]]))
     with pytest.raises(InputError, match=r"trials\.jsonl:2: damaged"):
         peek(here / "a", plan)
+    path.write_bytes(b"".join(2 * whole))
+    with pytest.raises(InputError, match=rf"trials\.jsonl:{len(whole) + 1}: damaged: not the trial"):
+        peek(here / "a", plan)
+    with pytest.raises(InputError, match="a trial comes twice"):
+        read_store(here / "a")
     path.write_bytes(b"".join([whole[1], whole[0]]))
     with pytest.raises(InputError, match=r"trials\.jsonl:1: damaged: not the trial"):
         peek(here / "a", plan)
