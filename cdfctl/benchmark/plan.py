@@ -18,6 +18,7 @@ from typing import Any
 from cdfctl.benchmark.sweep import Setting, label
 from cdfctl.benchmark.tables import table_mark
 from cdfctl.errors import InputError
+from cdfctl.reading import check_regular
 from cdfctl.robots.robot import Robot
 from cdfctl.scenario.library import ScenarioFile, load_scenario
 from cdfctl.scenario.overrides import Override
@@ -215,4 +216,13 @@ def _files(scenario: Scenario) -> dict[str, str]:
     bodies = [*scenario.obstacles, getattr(scenario.task, "target", None)]
     shapes = [body.shape for body in bodies if body is not None]
     paths = {shape.file for shape in shapes if isinstance(shape, MeshShape | CloudShape) and shape.file is not None}
-    return {path: hashlib.sha256(Path(path).read_bytes()).hexdigest() for path in sorted(paths)}
+    try:
+        return {path: _hash(Path(path)) for path in sorted(paths)}
+    except OSError as error:
+        raise InputError(f"{error.filename}: cannot be read: {error.strerror}") from None
+
+
+def _hash(path: Path) -> str:
+    check_regular(path)
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from cdfctl.benchmark.lines import TIMES, TRIAL, Record, key_of, read_lines
 from cdfctl.benchmark.plan import Cell
 from cdfctl.benchmark.statistics import CellSummary, summarise
-from cdfctl.benchmark.store import FORMAT, MANIFEST, TIMING, TRIALS, VERSION, Record, read_lines
+from cdfctl.benchmark.store import FORMAT, MANIFEST, TIMING, TRIALS, VERSION
 from cdfctl.benchmark.sweep import Setting, parse_sweep
 from cdfctl.errors import CdfctlError, InputError
+from cdfctl.reading import read_json
 from cdfctl.scenario.wording import validate
+
+AGAIN = "run the benchmark again"
+RIGHT = "name the folder that cdfctl bench wrote"
 
 
 @dataclass(frozen=True)
@@ -51,32 +55,34 @@ def read_store(folder: Path) -> StoredBench:
         notes = manifest.get("cells") or [{} for _ in configuration["cells"]]
         cells = [_cell(config, note) for config, note in zip(configuration["cells"], notes, strict=True)]
     except (KeyError, TypeError, ValueError, AttributeError, CdfctlError):
-        raise InputError(f"{path}: damaged: not the manifest of a benchmark", "run the benchmark again") from None
-    records = read_lines(folder / TRIALS)
+        raise InputError(f"{path}: damaged: not the manifest of a benchmark", AGAIN) from None
+    records = read_lines(folder / TRIALS, TRIAL)
+    if len({key_of(record) for record in records}) != len(records):
+        raise InputError(f"{folder / TRIALS}: damaged: a trial comes twice", AGAIN)
     try:
-        timings = read_lines(folder / TIMING)
+        timings = read_lines(folder / TIMING, TIMES)
         summaries = summarise(cells, records, timings)
         found = tuple(CellTrials(summary, tuple(r for r in records if _of(r, summary.cell))) for summary in summaries)
     except (KeyError, TypeError, ValueError):
-        raise InputError(f"{folder / TRIALS}: damaged: a trial lacks a column", "run the benchmark again") from None
+        raise InputError(f"{folder / TRIALS}: damaged: a trial lacks a column", AGAIN) from None
     if not found:
-        raise InputError(f"{folder}: a benchmark without a finished trial")
+        raise InputError(f"{folder}: a benchmark without a finished trial", AGAIN)
     return StoredBench(suite, seed, found)
 
 
 def _manifest(folder: Path) -> dict[str, Any]:
     path = folder / MANIFEST
     try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
+        manifest = read_json(path)
     except OSError as error:
-        raise InputError(f"{folder}: not a benchmark's folder: {MANIFEST}: {error.strerror or error}") from None
-    except (ValueError, RecursionError):
-        raise InputError(f"{path}: damaged: not JSON", "run the benchmark again") from None
+        raise InputError(f"{folder}: not a benchmark's folder: {MANIFEST}: {error.strerror or error}", RIGHT) from None
+    except ValueError:
+        raise InputError(f"{path}: damaged: not JSON", AGAIN) from None
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
-        raise InputError(f"{folder}: not a benchmark's folder of cdfctl")
+        raise InputError(f"{folder}: not a benchmark's folder of cdfctl", RIGHT)
     version = manifest.get("version")
     if not isinstance(version, int) or version < 1:
-        raise InputError(f"{path}: damaged: no version")
+        raise InputError(f"{path}: damaged: no version", AGAIN)
     if version > VERSION:
         raise InputError(f"{path}: written by a newer cdfctl (format {version}, this one reads {VERSION})", "update it")
     return manifest

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdfctl.benchmark.lines import Record
 from cdfctl.benchmark.plan import Cell
 from cdfctl.benchmark.solvable.trials import Share, shares
-from cdfctl.benchmark.store import Record
 from cdfctl.types import OUTCOMES
 
 

@@ -8,25 +8,42 @@
     trajectories/     run folders of the trials that are kept
     summary.json, summary.md
 
-Every line goes to the operating system before the next trial is taken up, so a kill loses the trials in flight only. A
-torn last line is dropped. One process at a time: a lock that its death releases.
+A line of trials ends with a checksum of the rest (see :mod:`cdfctl.benchmark.lines`). Every line goes to the operating
+system before the next trial is taken up, so a kill loses the trials in flight only. A torn last line is dropped. One
+process at a time: a lock that its death releases.
 """
 
 from __future__ import annotations
 
 import fcntl
+import itertools
 import json
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
+from cdfctl.benchmark.lines import (
+    AGAIN,
+    PROVED,
+    TIMES,
+    TRIAL,
+    Record,
+    append,
+    drop_torn,
+    key_of,
+    read_lines,
+    replace,
+    unlink,
+    unwritable,
+)
 from cdfctl.benchmark.plan import Plan, digest
 from cdfctl.benchmark.trial import Answer, record_of, timing_of
 from cdfctl.benchmark.versions import versions
 from cdfctl.errors import InputError
+from cdfctl.reading import read_json, refuse_link
 from cdfctl.simulation.run_folder import write_run
 from cdfctl.types import TrialKey
 
@@ -37,18 +54,12 @@ VERSION = 1
 MANIFEST, TRIALS, ARRIVED, TIMING, LOCK = "manifest.json", "trials.jsonl", "arrived.jsonl", "timing.jsonl", ".lock"
 SOLVABLE = "solvable.jsonl"
 
-Record = dict[str, Any]
+ANOTHER = "give another --out"
 
 
 def default_store(plan: Plan) -> Path:
     """``runs/<suite>-<hash>``: another configuration, or other code, is another folder."""
     return Path("runs") / f"{plan.suite}-{digest({'configuration': plan.configuration(), 'versions': versions()})}"
-
-
-def key_of(record: Record) -> TrialKey:
-    """The key of a line of ``trials.jsonl``."""
-    names = ("scenario", "controller", "on_infeasible", "seed", "trial")
-    return TrialKey(*(record[name] for name in names))
 
 
 @dataclass
@@ -79,10 +90,10 @@ class Store:
         """
         if answer.run is not None:
             write_run(self.folder / "trajectories" / folder_name(answer.result.key), answer.run)
-        _append(self.folder / TIMING, [timing_of(answer)])
+        append(self.folder / TIMING, [timing_of(answer)], checked=False)
         record = record_of(answer.result)
         if self.keys[len(self.records)] != answer.result.key:
-            _append(self.folder / ARRIVED, [record])
+            append(self.folder / ARRIVED, [record])
         self.early[answer.result.key] = record
         self._advance()
 
@@ -91,28 +102,28 @@ class Store:
         ready: list[Record] = []
         while (place := len(self.records) + len(ready)) < len(self.keys) and self.keys[place] in self.early:
             ready.append(self.early[self.keys[place]])
-        _append(self.folder / TRIALS, ready)
+        append(self.folder / TRIALS, ready)
         for record in ready:
             del self.early[key_of(record)]
         self.records += ready
         if not self.early:
-            _unlink(self.folder / ARRIVED)
+            unlink(self.folder / ARRIVED)
 
     def timings(self) -> list[Record]:
         """The lines of ``timing.jsonl``."""
-        return read_lines(self.folder / TIMING)
+        return read_lines(self.folder / TIMING, TIMES)
 
     def solvable(self) -> list[Record]:
         """The lines of ``solvable.jsonl``."""
-        return read_lines(self.folder / SOLVABLE)
+        return read_lines(self.folder / SOLVABLE, PROVED)
 
     def add_solvable(self, record: Record) -> None:
         """Keep what is proved of one set-up. Raises :class:`InputError` as :meth:`add`."""
-        _append(self.folder / SOLVABLE, [record])
+        append(self.folder / SOLVABLE, [record], checked=False)
 
     def write(self, name: str, text: str) -> None:
         """Write a file of the store whole or not at all. Raises :class:`InputError` where the disk does not take it."""
-        _replace(self.folder / name, text)
+        replace(self.folder / name, text)
 
 
 def folder_name(key: TrialKey) -> str:
@@ -146,19 +157,22 @@ def open_store(folder: Path, plan: Plan) -> Iterator[Store]:
         _check_ours(folder, plan)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        lock = (folder / LOCK).open("a")
+        for name in (LOCK, "trajectories"):
+            refuse_link(folder / name)
+        # For reading too: where it is a pipe, that does not wait for somebody else.
+        lock = os.fdopen(os.open(folder / LOCK, os.O_CREAT | os.O_RDWR, 0o666), "rb")
     except OSError as error:
-        raise _unwritable(folder, error) from None
+        raise unwritable(folder, error) from None
     with lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             raise InputError(f"{folder}: another bench is writing to this store", "wait for it, or use --out") from None
         for name in (TRIALS, ARRIVED, TIMING, SOLVABLE):
-            _drop_torn(folder / name)
+            drop_torn(folder / name)
         keys = list(plan.keys())
         records, early = _read(folder, keys)
-        _replace(folder / MANIFEST, json.dumps(_manifest(plan, max(len(records), len(keys))), indent=2) + "\n")
+        replace(folder / MANIFEST, json.dumps(_manifest(plan, max(len(records), len(keys))), indent=2) + "\n")
         store = Store(folder, records, early, keys)
         store._advance()
         yield store
@@ -179,25 +193,25 @@ def _manifest(plan: Plan, keys: int) -> dict[str, Any]:
 def _check_ours(folder: Path, plan: Plan) -> None:
     """Refuse, before anything is run, a folder that is not the store of this plan by this code."""
     if not folder.is_dir():
-        raise InputError(f"{folder}: is a file, not a benchmark's folder", "give another --out")
+        raise InputError(f"{folder}: is a file, not a benchmark's folder", ANOTHER)
     path = folder / MANIFEST
-    if not path.exists():
+    if not os.path.lexists(path):
         if any(item.name != LOCK for item in folder.iterdir()):
-            raise InputError(f"{folder}: is not empty and not a benchmark's folder", "give another --out")
+            raise InputError(f"{folder}: is not empty and not a benchmark's folder", ANOTHER)
         return
     try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
+        manifest = read_json(path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}", ANOTHER) from None
     except ValueError:
-        raise InputError(f"{path}: damaged: not JSON", "give another --out") from None
+        raise InputError(f"{path}: damaged: not JSON", ANOTHER) from None
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
-        raise InputError(f"{folder}: is not empty and not a benchmark's folder", "give another --out")
+        raise InputError(f"{folder}: is not empty and not a benchmark's folder", ANOTHER)
     if manifest.get("version") != VERSION:
         found = f"{path}: format {manifest.get('version')}, this cdfctl reads {VERSION}"
         raise InputError(f"{found}: the store is of another version", "use the cdfctl that wrote it, or another --out")
     if manifest.get("configuration") != json.loads(json.dumps(plan.configuration())):
-        raise InputError(f"{folder}: holds a benchmark of another configuration", "give another --out")
+        raise InputError(f"{folder}: holds a benchmark of another configuration", ANOTHER)
     _check_versions(folder, manifest.get("versions"))
 
 
@@ -214,87 +228,17 @@ def _check_versions(folder: Path, theirs: object) -> None:
 
 
 def _read(folder: Path, keys: list[TrialKey]) -> tuple[list[Record], dict[TrialKey, Record]]:
-    """The finished trials of a store; ``trials.jsonl`` has to follow the plan as far as both go."""
-    records = read_lines(folder / TRIALS)
-    for line, (record, key) in enumerate(zip(records, keys, strict=False), start=1):
-        if key_of(record) != key:
+    """The finished trials of a store; ``trials.jsonl`` has to follow the plan, and no trial comes twice."""
+    records = read_lines(folder / TRIALS, TRIAL)
+    seen: set[TrialKey] = set()
+    for line, (record, key) in enumerate(itertools.zip_longest(records, keys), start=1):
+        if record is None:
+            break
+        # Beyond the plan there may be what was asked for before, when it had more trials.
+        if (key is not None and key_of(record) != key) or key_of(record) in seen:
             place = f"{folder / TRIALS}:{line}"
-            raise InputError(f"{place}: damaged: not the trial that belongs there", "use another --out")
+            raise InputError(f"{place}: damaged: not the trial that belongs there", AGAIN)
+        seen.add(key_of(record))
     wanted = set(keys[len(records) :])
-    early = {key_of(record): record for record in read_lines(folder / ARRIVED)}
+    early = {key_of(record): record for record in read_lines(folder / ARRIVED, TRIAL)}
     return records, {key: record for key, record in early.items() if key in wanted}
-
-
-def read_lines(path: Path) -> list[Record]:
-    """The objects of a file of JSON lines; a torn last line is left out, and there may be no file.
-
-    Raises:
-        InputError: it cannot be read, or a line in it is damaged.
-    """
-    try:
-        text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
-    records = []
-    for number, line in enumerate(text.split("\n")[:-1], start=1):
-        try:
-            record = json.loads(line)
-            if path.name == SOLVABLE:
-                record["problem"], record["trial"], record["answer"]
-            elif path.name != TIMING:
-                key_of(record)
-        except (ValueError, TypeError, KeyError):
-            raise InputError(f"{path}:{number}: damaged: not a trial", "use another --out") from None
-        records.append(record)
-    return records
-
-
-def _drop_torn(path: Path) -> None:
-    """Cut off what follows the last line feed: a write that was cut short."""
-    try:
-        if not path.exists():
-            return
-        data = path.read_bytes()
-        whole = data.rfind(b"\n") + 1
-        if whole < len(data):
-            os.truncate(path, whole)
-    except OSError as error:
-        raise _unwritable(path, error) from None
-
-
-def _append(path: Path, records: list[Record]) -> None:
-    if not records:
-        return
-    text = "".join(json.dumps(record, ensure_ascii=False, allow_nan=False) + "\n" for record in records)
-    try:
-        with path.open("ab", buffering=0) as file:
-            _write_all(file, text.encode("utf-8"))
-    except OSError as error:
-        raise _unwritable(path, error) from None
-
-
-def _write_all(file: IO[bytes], data: bytes) -> None:
-    while data:  # a full disk may take a part
-        data = data[file.write(data) :]
-
-
-def _replace(path: Path, text: str) -> None:
-    draft = path.with_name(f".{path.name}.new")
-    try:
-        draft.write_text(text, encoding="utf-8")
-        draft.replace(path)
-    except OSError as error:
-        _unlink(draft)
-        raise _unwritable(path, error) from None
-
-
-def _unlink(path: Path) -> None:
-    with suppress(OSError):
-        path.unlink(missing_ok=True)
-
-
-def _unwritable(path: Path, error: OSError) -> InputError:
-    return InputError(
-        f"{path}: cannot be written: {error.strerror or error}",
-        "the trials written before are kept: the same command goes on from there",
-    )

@@ -254,7 +254,7 @@ def _summarise(plan: Plan, store: Store) -> list[CellSummary]:
     from cdfctl.report.bench_text import markdown
 
     wanted = set(store.keys)
-    from cdfctl.benchmark.store import key_of
+    from cdfctl.benchmark.lines import key_of
 
     records = [r for r in [*store.records, *store.early.values()] if key_of(r) in wanted]
     summaries = summarise(plan.cells, records, store.timings(), store.solvable())

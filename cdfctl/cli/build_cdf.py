@@ -112,7 +112,7 @@ def check_target(target: Path) -> None:
     if target.suffix != SUFFIX:
         raise InputError(f"--out {target}: a table is a {SUFFIX} file")
     if target.is_dir():
-        raise InputError(f"--out {target}: is a folder")
+        raise InputError(f"{target}: is a folder, not a table", "remove it, or give another --out")
 
 
 def present(target: Path, robot: Robot, wanted: dict[str, Any]) -> StoredTable | None:

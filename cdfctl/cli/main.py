@@ -75,7 +75,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return report_failure(error, debug=debug)
     except CommandLineError as error:
         return report_usage(error, debug=debug)
-    except (KeyboardInterrupt, typer.Abort):
+    except (KeyboardInterrupt, typer.Abort) as error:
+        if isinstance(error.__cause__, EOFError):  # Typer takes it for the end of what someone types
+            return report_bug(error.__cause__, words, debug=debug)
         print("cdfctl: interrupted", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:

@@ -109,6 +109,9 @@ def plot(
         raise InputError("nothing to plot", f"name a run folder, a benchmark's folder, or --figure: {PAPER}")
     if source is not None and not source.exists():
         raise InputError(f"{source}: no such folder", "cdfctl run and cdfctl bench say where they write")
+    if source is not None and out is None and (source / FOLDER).is_symlink():
+        # The folder may be a stranger's: what is in it must not lead elsewhere what is written.
+        raise InputError(f"{source / FOLDER}: is a symbolic link", "give --out")
     from cdfctl.report.figures.style import need_matplotlib
 
     need_matplotlib()

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 from pydantic_core import ErrorDetails
 
 from cdfctl.errors import InputError, MissingError, name_hint
+from cdfctl.reading import check_regular
 from cdfctl.scenario.problems import Problem, ScenarioErrors, path_text
 from cdfctl.scenario.yaml_loader import MAX_BYTES, Document, YamlError, read
 
@@ -138,6 +139,7 @@ def _read_text(path: Path) -> str:
     if path.is_dir():
         raise InputError(f"{path}: is a directory, not a robot file")
     try:
+        check_regular(path)
         if path.stat().st_size > MAX_BYTES:
             raise InputError(f"{path}: larger than {MAX_BYTES} bytes, which no robot file is")
         text = path.read_text(encoding="utf-8")

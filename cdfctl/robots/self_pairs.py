@@ -27,6 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cdfctl.cache import cache_dir, writable_dir
+from cdfctl.reading import read_json
 from cdfctl.robots.coal_geometry import exact_request
 from cdfctl.robots.robot import Robot
 from cdfctl.robots.srdf import link_pair
@@ -151,7 +152,7 @@ def _key(robot: Robot, candidates: tuple[Pair, ...]) -> str:
 def _read(path: Path, key: str, candidates: tuple[Pair, ...]) -> SelfPairs | None:
     """What a cache file says, None where there is none for this robot or it makes no sense."""
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = read_json(path)
         if document["key"] != key:
             return None
         found = SelfPairs(*(tuple((int(i), int(j)) for i, j in document[name]) for name in SelfPairs._fields))

@@ -199,6 +199,8 @@ def check_geometry(path: Path, link: str, element: Element, package_dirs: Sequen
 def _resolve_mesh(path: Path, link: str, name: str, package_dirs: Sequence[Path]) -> Path:
     """The absolute path of a mesh, or an error that names where it was looked for."""
     if name.startswith("package://"):
+        if ".." in Path(name).parts:
+            raise InputError(f"{path}: mesh '{name}' of link '{link}' leaves its package", "name it without '..'")
         candidates = list(_in_packages(path, name.removeprefix("package://"), package_dirs))
     else:
         candidates = [path.parent / name.removeprefix("file://")]

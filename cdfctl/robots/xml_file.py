@@ -7,6 +7,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from cdfctl.errors import InputError
+from cdfctl.reading import read_bytes
 
 
 def read_robot_xml(path: Path, kind: str, article: str) -> Element:
@@ -16,12 +17,12 @@ def read_robot_xml(path: Path, kind: str, article: str) -> Element:
         InputError: it cannot be read, defines XML entities, is not well formed, or has another root, in one line.
     """
     try:
-        data = path.read_bytes()
+        data = read_bytes(path)
     except FileNotFoundError:
         raise InputError(f"{path}: no such {kind} file") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    if b"<!ENTITY" in data:
+    if b"<!ENTITY" in data.replace(b"\0", b""):  # in UTF-16 too
         raise InputError(f"{path}: {article} {kind} with XML entities is not read")
     try:
         root = ElementTree.fromstring(data)

@@ -170,7 +170,7 @@ def _read(path: Path, shown: str) -> Document:
         with path.open("rb") as file:
             raw = file.read(MAX_BYTES + 1)
     except OSError as error:
-        raise InputError(f"{shown}: cannot be read: {error.strerror or error}") from None
+        raise InputError(f"{shown}: cannot be read: {error.strerror or error}", "name a scenario file") from None
     if len(raw) > MAX_BYTES:
         hint = "put large point sets in a file of their own (shape.file)"
         raise InputError(f"{shown}: over {MAX_BYTES >> 20} MiB: too large for a scenario", hint)

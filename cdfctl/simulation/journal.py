@@ -21,19 +21,23 @@ from typing import IO, Any
 import numpy as np
 
 from cdfctl.errors import InputError
+from cdfctl.reading import check_regular, parse_json
 from cdfctl.scenario.dump import dump
 from cdfctl.scenario.library import load_scenario
 from cdfctl.scenario.schema import Scenario
 from cdfctl.simulation.recorder import STEP_ARRAYS
 from cdfctl.simulation.rollout import Step
-from cdfctl.simulation.run_folder import SCENARIO
+from cdfctl.simulation.run_folder import AGAIN, SCENARIO, trajectory_of
 from cdfctl.types import Array, Trajectory
 
 FORMAT, VERSION = "cdfctl-live", 1
 STEPS = "steps.bin"
+LONGEST, MOST = 65536, 10_000  # bytes of the first line, numbers along an axis of an array
 
 _STATE = {"t": "t", "q": "q"}  # of a record, from the step's state
 _SCENE = {"obstacle_pose": "poses", "obstacle_twist": "twists"}  # and from its scene
+KNOWN = {*_STATE, *_SCENE, *STEP_ARRAYS, "step_time"}
+NEEDED = {"t", "q", *_SCENE, "u", "h", "infeasible", "step_time"}
 
 
 def live_folder(folder: Path) -> Path:
@@ -128,6 +132,7 @@ def _record(step: Step) -> dict[str, Array]:
 def is_going_on(live: Path) -> bool:
     """Whether a run writes to the folder ``live`` now."""
     try:
+        check_regular(live / STEPS)
         with (live / STEPS).open("rb") as file:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -147,19 +152,21 @@ class JournalReader:
     def __init__(self, live: Path) -> None:
         """Raises :class:`cdfctl.errors.InputError` where ``live`` is no journal of this version."""
         self._live = live
-        self.scenario = load_scenario(live / SCENARIO).scenario
         try:
+            for name in (SCENARIO, STEPS):
+                check_regular(live / name)
             self._file = (live / STEPS).open("rb")
         except OSError as error:
-            raise InputError(f"{live}: cannot be read: {error.strerror or error}") from None
+            raise InputError(f"{live}: cannot be read: {error.strerror or error}", hint=AGAIN) from None
         try:
-            header = json.loads(self._file.readline())
-            if header["format"] != FORMAT or header["version"] != VERSION:
-                raise ValueError(f"format {header['format']} {header['version']}")
-            self._fields = [(str(name), tuple(shape)) for name, shape in header["fields"]]
-        except (ValueError, KeyError, TypeError) as error:
+            self.scenario = load_scenario(live / SCENARIO).scenario
+            self._fields = _fields(self._file.readline(LONGEST))
+        except ValueError as error:
             self._file.close()
-            raise InputError(f"{live / STEPS}: not a run in progress of this cdfctl: {error}") from None
+            raise InputError(f"{live / STEPS}: not a run in progress of this cdfctl: {error}", hint=AGAIN) from None
+        except InputError:
+            self._file.close()
+            raise
         self._width = sum(math.prod(shape) for _, shape in self._fields)
         self._rest = b""
         self._rows = np.zeros((0, self._width))
@@ -195,4 +202,25 @@ class JournalReader:
             columns = self._rows[:, start:end].reshape(-1, *shape)
             arrays[name] = columns if name in _STATE or name in _SCENE else columns[:N]
             start = end
-        return Trajectory(infeasible=arrays.pop("infeasible") != 0.0, **arrays)
+        arrays["infeasible"] = arrays["infeasible"] != 0.0
+        return trajectory_of(arrays, self._live / STEPS)
+
+
+def _fields(line: bytes) -> list[tuple[str, tuple[int, ...]]]:
+    """The names and shapes of a record, as the first line of a journal says. Raises :class:`ValueError`."""
+    header = parse_json(line.decode("utf-8"))
+    if not isinstance(header, dict) or header.get("format") != FORMAT or not isinstance(header.get("fields"), list):
+        raise ValueError("its first line is not that of a journal")
+    if header.get("version") != VERSION:
+        raise ValueError(f"format {header.get('version')}, this one reads {VERSION}")
+    fields = []
+    for field in header["fields"]:
+        if not (isinstance(field, list) and len(field) == 2 and isinstance(field[1], list) and len(field[1]) <= 2):
+            raise ValueError("its first line is damaged")
+        name, shape = field
+        if not isinstance(name, str) or name not in KNOWN or not all(type(k) is int and 0 <= k <= MOST for k in shape):
+            raise ValueError("its first line is damaged")
+        fields.append((name, tuple(shape)))
+    if len({name for name, _ in fields}) != len(fields) or not {name for name, _ in fields} >= NEEDED:
+        raise ValueError("its first line is damaged")
+    return fields

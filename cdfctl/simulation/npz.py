@@ -11,6 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cdfctl.reading import check_regular
+
+PLENTY = 256 * 2**20  # bytes that any archive may unpack to
+WRONG = (
+    zipfile.BadZipFile, zlib.error, EOFError, KeyError, AttributeError, TypeError, MemoryError, OverflowError,
+    NotImplementedError, RuntimeError,
+)  # fmt: skip
+"""What numpy and zipfile raise for archives that are damaged, beside ValueError."""
+
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the least a zip entry can say
 
 
@@ -31,8 +40,16 @@ def read_npz(path: Path) -> dict[str, NDArray[Any]]:
         OSError: it cannot be read.
     """
     try:
+        check_regular(path)
         # Opened here: numpy leaves its own handle open where the archive is damaged.
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+            _check_size(archive.zip, path.stat().st_size)
             return {name: archive[name] for name in archive.files}
-    except (zipfile.BadZipFile, zlib.error, EOFError, KeyError, AttributeError, TypeError) as error:
-        raise ValueError(str(error)) from None
+    except WRONG as error:
+        raise ValueError(str(error) or type(error).__name__) from None
+
+
+def _check_size(archive: zipfile.ZipFile, packed: int) -> None:
+    """Refuse what unpacks to so much more than it is that it can only be meant to fill the memory."""
+    if sum(entry.file_size for entry in archive.infolist()) > max(PLENTY, 20 * packed):
+        raise ValueError("it unpacks to more than twenty times its size")

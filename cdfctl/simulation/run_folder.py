@@ -19,18 +19,24 @@ from typing import Any
 import numpy as np
 
 from cdfctl.errors import InputError
+from cdfctl.reading import MIB, check_regular, read_json
 from cdfctl.scenario.dump import dump
 from cdfctl.scenario.library import load_scenario
 from cdfctl.scenario.schema import Scenario
 from cdfctl.simulation.npz import read_npz, write_npz
 from cdfctl.simulation.result import RunResult
-from cdfctl.types import Trajectory
+from cdfctl.types import OUTCOMES, Trajectory
 
 FORMAT = "cdfctl-run"
 VERSION = 1
 """The version of the folder this code writes, and the newest it reads."""
 
 SCENARIO, RESULT, TRAJECTORY = "scenario.yaml", "result.json", "trajectory.npz"
+
+AGAIN = "run the scenario again"
+RIGHT = "name the folder that cdfctl run wrote"
+
+NUMBERS = ("seed", "trial", "steps", "infeasible_steps", "time_to_reach_s", "collision_time_s", "min_clearance_m")
 
 STACK = ("cdfctl", "numpy", "pin", "coal", "numba", "qpsolvers", "daqp", "clarabel")
 """The packages that decide a run's numbers; their versions are kept with it."""
@@ -135,15 +141,20 @@ def read_run(folder: Path) -> Run:
         InputError: it is no run folder, or a newer one than this code reads, or it is damaged, in one line.
     """
     document = _document(folder)
-    scenario = load_scenario(folder / SCENARIO).scenario
+    path = folder / SCENARIO
+    try:
+        check_regular(path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}", hint=AGAIN) from None
+    scenario = load_scenario(path).scenario
     path = folder / TRAJECTORY
     try:
         arrays = read_npz(path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}", hint=AGAIN) from None
     except ValueError as error:
-        raise InputError(f"{path}: damaged: {error}", hint="run the scenario again") from None
-    return Run(folder, scenario, document, _trajectory(arrays, path))
+        raise InputError(f"{path}: damaged: {error}", hint=AGAIN) from None
+    return Run(folder, scenario, document, trajectory_of(arrays, path))
 
 
 def check_fits(run: Run, robot: str, n: int, m: int) -> None:
@@ -156,40 +167,50 @@ def check_fits(run: Run, robot: str, n: int, m: int) -> None:
     if arrays.q.shape[1] != n:
         raise InputError(
             f"{path}: is of {arrays.q.shape[1]} joints, but the scenario's robot '{robot}' has {n}",
-            hint="run the scenario again",
+            hint=AGAIN,
         )
     if arrays.h.shape[1] != m:
-        raise InputError(
-            f"{path}: is of {arrays.h.shape[1]} obstacles, but the scenario has {m}", hint="run the scenario again"
-        )
+        raise InputError(f"{path}: is of {arrays.h.shape[1]} obstacles, but the scenario has {m}", hint=AGAIN)
     if not all(np.isfinite(array).all() for array in (arrays.t, arrays.q, arrays.obstacle_pose)):
-        raise InputError(f"{path}: damaged: a time, a configuration or a pose is not finite", "run the scenario again")
+        raise InputError(f"{path}: damaged: a time, a configuration or a pose is not finite", AGAIN)
 
 
 def _document(folder: Path) -> dict[str, Any]:
     path = folder / RESULT
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
+        record = read_json(path, 4 * MIB)
     except OSError as error:
-        raise InputError(f"{folder}: not a run folder: {RESULT}: {error.strerror or error}") from None
-    except (ValueError, RecursionError):
-        raise InputError(f"{path}: damaged: not JSON", hint="run the scenario again") from None
+        raise InputError(f"{folder}: not a run folder: {RESULT}: {error.strerror or error}", hint=RIGHT) from None
+    except ValueError:
+        raise InputError(f"{path}: damaged: not JSON", hint=AGAIN) from None
     if not isinstance(record, dict) or record.get("format") != FORMAT:
-        raise InputError(f"{folder}: not a run folder of cdfctl")
+        raise InputError(f"{folder}: not a run folder of cdfctl", hint=RIGHT)
     version = record.get("version")
     if not isinstance(version, int) or version < 1:
-        raise InputError(f"{path}: damaged: no version")
+        raise InputError(f"{path}: damaged: no version", hint=AGAIN)
     if version > VERSION:
         raise InputError(
             f"{path}: written by a newer cdfctl (format {version}, this one reads {VERSION})", hint="update cdfctl"
         )
+    _check_document(record, path)
     return record
+
+
+def _check_document(record: dict[str, Any], path: Path) -> None:
+    """What figures and pages rely on in a document that anyone may have written."""
+    for name in NUMBERS:
+        value = record.get(name)
+        if value is not None and not (isinstance(value, int | float) and abs(value) < 1e18):
+            raise InputError(f"{path}: damaged: '{name}' is no number", hint=AGAIN)
+    robot, outcome = record.get("robot", ""), record.get("outcome")
+    if not isinstance(robot, str) or len(robot) > 256 or (outcome is not None and outcome not in OUTCOMES):
+        raise InputError(f"{path}: damaged: 'robot' or 'outcome' is none", hint=AGAIN)
 
 
 def _is_ours(folder: Path) -> bool:
     try:
-        record = json.loads((folder / RESULT).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        record = read_json(folder / RESULT)
+    except (OSError, ValueError):
         return False
     return isinstance(record, dict) and record.get("format") == FORMAT
 
@@ -200,14 +221,14 @@ def arrays_of(trajectory: Trajectory) -> dict[str, Any]:
     return {name: array for name, array in arrays.items() if array is not None}
 
 
-def _trajectory(arrays: dict[str, Any], path: Path) -> Trajectory:
+def trajectory_of(arrays: dict[str, Any], path: Path) -> Trajectory:
     """The arrays as a trajectory, their shapes checked against each other."""
     required = [f.name for f in fields(Trajectory) if f.name not in _OPTIONAL_ARRAYS]
     for name in required:
         if name not in arrays:
-            raise InputError(f"{path}: damaged: the array '{name}' is missing", hint="run the scenario again")
+            raise InputError(f"{path}: damaged: the array '{name}' is missing", hint=AGAIN)
     if arrays["u"].ndim != 2 or arrays["h"].ndim != 2:
-        raise InputError(f"{path}: damaged: 'u' and 'h' must have two axes")
+        raise InputError(f"{path}: damaged: 'u' and 'h' must have two axes", hint=AGAIN)
     (N, n), m = arrays["u"].shape, arrays["h"].shape[1]
     K = arrays["plan_t"].shape[-1] if "plan_t" in arrays and arrays["plan_t"].ndim else 0
     expected: dict[str, tuple[int, ...]] = {
@@ -232,7 +253,7 @@ def _trajectory(arrays: dict[str, Any], path: Path) -> Trajectory:
         kind = np.bool_ if name == "infeasible" else np.float64
         array = arrays.get(name)
         if array is not None and (array.shape != shape or array.dtype != kind):
-            raise InputError(f"{path}: damaged: '{name}' is {array.dtype} {array.shape}, expected {shape}")
+            raise InputError(f"{path}: damaged: '{name}' is {array.dtype} {array.shape}, expected {shape}", hint=AGAIN)
     return Trajectory(**{name: arrays[name] for name in expected if name in arrays})
 
 

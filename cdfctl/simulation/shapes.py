@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
 from cdfctl.errors import InputError
+from cdfctl.reading import read_bytes
 from cdfctl.scenario.shapes import (
     BallShape,
     BoxShape,
@@ -64,16 +66,17 @@ def load_points(path: Path) -> Array:
     if suffix not in POINT_FILES:
         raise InputError(f"{path}: a file of points ends in {', '.join(POINT_FILES)}, found '{path.suffix}'")
     try:
+        data = read_bytes(path)
         if suffix == ".npy":
-            points = np.asarray(np.load(path, allow_pickle=False), dtype=np.float64)
+            points = np.asarray(np.load(io.BytesIO(data), allow_pickle=False), dtype=np.float64)
         else:
-            text = path.read_text(encoding="utf-8")
+            text = data.decode("utf-8")
             rows = [line.split("#", 1)[0].strip() for line in text.splitlines()]
             split = "," if suffix == ".csv" else None
             points = np.array([[float(x) for x in row.split(split)] for row in rows if row])
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except (ValueError, TypeError, EOFError) as error:
+    except (ValueError, TypeError, EOFError, MemoryError, OverflowError, RecursionError) as error:
         raise InputError(f"{path}: not a file of points: {error}", hint="three numbers a line: x y z, in m") from None
     if points.ndim != 2 or points.shape[1] != 3 or not 1 <= points.shape[0] <= MAX_POINTS:
         raise InputError(f"{path}: expected 1 to {MAX_POINTS} points of three coordinates, found shape {points.shape}")

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from cdfctl.benchmark import store as stores
+from cdfctl.benchmark import lines
 from cdfctl.benchmark.plan import Plan, make_plan
+from cdfctl.benchmark.reading import read_store
 from cdfctl.benchmark.run import Runner
-from cdfctl.benchmark.store import default_store, open_store, peek
+from cdfctl.benchmark.store import default_store, folder_name, open_store, peek
 from cdfctl.benchmark.trial import Answer, run_trial
 from cdfctl.errors import InputError, MissingError
 from cdfctl.simulation.run_folder import read_run
@@ -33,7 +34,7 @@ def fill(folder: Path, plan: Plan, given: list[Answer]) -> bytes:
 def test_the_order_of_the_file_is_that_of_the_plan(here: Path, plan: Plan) -> None:
     given = answers(plan)
     whole = fill(here / "a", plan, given)
-    assert [stores.key_of(json.loads(line)) for line in whole.splitlines()] == list(plan.keys())
+    assert [lines.key_of(json.loads(line)) for line in whole.splitlines()] == list(plan.keys())
     assert fill(here / "b", plan, given[::-1]) == whole
     assert not (here / "b" / "arrived.jsonl").exists()
 
@@ -77,7 +78,7 @@ def test_a_kept_run_is_the_run(here: Path, plan: Plan) -> None:
     given = answers(plan, "all")
     fill(here / "a", plan, given)
     assert len(list((here / "a" / "trajectories").iterdir())) == len(plan)
-    name = stores.folder_name(plan.cells[0].key(2))
+    name = folder_name(plan.cells[0].key(2))
     run = read_run(here / "a" / "trajectories" / name)
     assert run.document["outcome"] == given[4].result.verdict.outcome
     failures = [a for a in answers(plan, "failures") if a.run is not None]
@@ -131,9 +132,66 @@ def test_damage_inside_is_named_by_its_line(here: Path, plan: Plan) -> None:
     path.write_bytes(b"".join([whole[0], b"{]\n", *whole[2:]]))
     with pytest.raises(InputError, match=r"trials\.jsonl:2: damaged"):
         peek(here / "a", plan)
+    path.write_bytes(b"".join(2 * whole))
+    with pytest.raises(InputError, match=rf"trials\.jsonl:{len(whole) + 1}: damaged: not the trial"):
+        peek(here / "a", plan)
+    with pytest.raises(InputError, match="a trial comes twice"):
+        read_store(here / "a")
     path.write_bytes(b"".join([whole[1], whole[0]]))
     with pytest.raises(InputError, match=r"trials\.jsonl:1: damaged: not the trial"):
         peek(here / "a", plan)
+
+
+def test_every_bit_that_turns_over_is_noticed(here: Path, plan: Plan) -> None:
+    whole = fill(here / "a", plan, answers(plan)[:2])
+    path = here / "a" / "trials.jsonl"
+    for place in range(0, len(whole) - 1, 7):  # the last line feed is a torn line's
+        data = bytearray(whole)
+        data[place] ^= 1 << place % 8
+        path.write_bytes(data)
+        with pytest.raises(InputError, match=r"trials\.jsonl:[12]: damaged"):
+            peek(here / "a", plan)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"trial": [1]},
+        {"outcome": None},
+        {"steps": 1.5},
+        {"time_to_reach_s": "1"},
+        {"time_to_reach_s": float("nan")},
+        {"infeasible_steps": 10**400},
+        {"outcome": "reached", "path_length_m": None},
+    ],
+)
+def test_a_line_that_no_bench_writes_is_refused(here: Path, plan: Plan, change: dict[str, object]) -> None:
+    """With a checksum that fits: what follows may rely on types."""
+    fill(here / "a", plan, answers(plan)[:1])
+    path = here / "a" / "trials.jsonl"
+    record = json.loads(path.read_text())
+    del record["crc"]
+    record |= change
+    path.write_text(json.dumps(record | {"crc": lines.checksum(record)}) + "\n")
+    with pytest.raises(InputError, match=r"trials\.jsonl:1: damaged: not a trial"):
+        peek(here / "a", plan)
+
+
+@pytest.mark.parametrize("name", ["trials.jsonl", "timing.jsonl", ".lock", "trajectories", ".manifest.json.new"])
+def test_a_link_in_a_store_leads_nothing_astray(here: Path, plan: Plan, name: str) -> None:
+    """A torn last line is cut off and drafts are written: not those of a file somewhere else."""
+    given = answers(plan)[:1]
+    fill(here / "a", plan, given)
+    theirs = here / "theirs"
+    theirs.write_text("no line feed at the end")
+    (here / "a" / name).unlink(missing_ok=True)
+    (here / "a" / name).symlink_to(theirs)
+    if name == ".manifest.json.new":
+        fill(here / "a", plan, [])
+    else:
+        with pytest.raises(InputError, match="Is a symbolic link"):
+            fill(here / "a", plan, [])
+    assert theirs.read_text() == "no line feed at the end"
 
 
 def test_one_bench_at_a_time(here: Path, plan: Plan) -> None:
@@ -159,7 +217,7 @@ def test_a_full_disk_loses_nothing(here: Path, plan: Plan, monkeypatch: pytest.M
             file.write(data[: len(data) // 2])
             raise OSError(errno.ENOSPC, "No space left on device")
 
-        monkeypatch.setattr(stores, "_write_all", full)
+        monkeypatch.setattr(lines, "_write_all", full)
         with pytest.raises(InputError, match="No space left on device") as caught:
             store.add(given[2])
         assert "the same command goes on" in str(caught.value)

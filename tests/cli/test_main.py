@@ -150,6 +150,15 @@ def test_a_bug_without_a_place_for_its_log_is_still_one_line(cli, monkeypatch, t
     assert "--debug" in result.err
 
 
+def test_the_end_of_a_file_is_a_bug_and_no_interrupt(cli, monkeypatch, tmp_path):
+    """An empty file among the compiled kernels, for example: Typer would call it the end of what someone types."""
+    monkeypatch.setenv("CDFCTL_CACHE", str(tmp_path))
+    failing(monkeypatch, EOFError("Ran out of input"))
+    result = cli("fail")
+    assert result.status == 70
+    assert "EOFError: Ran out of input" in result.err
+
+
 def test_an_interrupt_is_130(cli, monkeypatch):
     failing(monkeypatch, KeyboardInterrupt())
     result = cli("fail")

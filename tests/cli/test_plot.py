@@ -125,6 +125,24 @@ def test_bad_options_of_a_run_write_nothing(cli, here, run, arguments, words):
     assert files_below(here) == before
 
 
+def test_links_in_a_run_lead_nothing_astray(cli, here, run):
+    """A run folder may be a stranger's: figures go into it, and into no other place."""
+    theirs = here / "theirs"
+    theirs.mkdir()
+    (theirs / "file").write_text("precious")
+    (run / "figures").mkdir(exist_ok=True)
+    (run / "figures" / ".time.png.new").symlink_to(theirs / "file")
+    assert cli("plot", run, "--figure", "time", "--dpi", "50").status == 0
+    assert (theirs / "file").read_text() == "precious"
+    shutil.rmtree(run / "figures")
+    (run / "figures").symlink_to(theirs)
+    result = cli("plot", run, "--figure", "time", "--dpi", "50")
+    assert result.status == 2
+    assert "is a symbolic link" in result.err
+    assert [path.name for path in theirs.iterdir()] == ["file"]
+    (run / "figures").unlink()
+
+
 def test_a_damaged_run_is_one_line(cli, here, run):
     (run / "trajectory.npz").write_bytes((run / "trajectory.npz").read_bytes()[:500])
     result = cli("plot", "run")

@@ -15,6 +15,7 @@ from cdfctl.errors import InputError
 from cdfctl.fields.kernel.body import body_of
 from cdfctl.fields.kernel.starts import Table
 from cdfctl.fields.table.build import BuildParameters, build_table, chunk_contacts, forget_chunks
+from cdfctl.fields.table.file import read_file, write_file
 from cdfctl.fields.table.grid import workspace_grid
 from cdfctl.fields.table.partial import PartialBuild
 from cdfctl.robots.robot import Robot
@@ -134,6 +135,24 @@ def test_chunks_of_other_parameters_are_not_used(planar: Robot, planar_table: Ta
     target = tmp_path / "t.safetensors"
     build_table(planar, BuildParameters(resolution=6, starts=24, radius=0.2), target, jobs=1)
     same(build_table(planar, BuildParameters(resolution=6, starts=24), target, jobs=1), planar_table)
+
+
+def test_chunks_that_are_none_are_searched_again(planar: Robot, planar_table: Table, tmp_path: Path) -> None:
+    """Whole files, with a checksum that fits, which no build of this robot writes."""
+    target, parameters = tmp_path / "t.safetensors", BuildParameters(resolution=6, starts=24)
+    build_table(planar, parameters, target, jobs=1)
+    chunk = tmp_path / "t.safetensors.partial" / "00000.chunk"
+    good = read_file(chunk)[0]
+    for name, array in (("count", good["count"] + np.int16(1)), ("q", good["q"] * np.float32("nan")), ("x", good["q"])):
+        write_file(chunk, {**good, name: array}, {})
+        same(build_table(planar, parameters, target, jobs=1), planar_table)
+
+
+def test_a_folder_in_the_place_of_a_file_is_named(tmp_path: Path) -> None:
+    (tmp_path / "t.safetensors.partial" / "key").mkdir(parents=True)
+    with pytest.raises(InputError, match="key: Is a directory") as caught, PartialBuild(tmp_path / "t.safetensors", {}):
+        pass
+    assert "remove" in str(caught.value)
 
 
 def test_two_builds_of_one_table_do_not_mix(tmp_path: Path) -> None:

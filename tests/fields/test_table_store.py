@@ -129,6 +129,18 @@ def test_arrays_that_do_not_fit_never_reach_compiled_code(planar: Robot, path: P
         load_table(path, planar)
 
 
+def test_a_number_of_points_that_runs_over_is_refused(planar: Robot, path: Path) -> None:
+    arrays, metadata = read_file(path)
+    points = len(arrays["first"]) - 1
+    sides = [(points * pow(odd, -1, 2**64) % 2**64, odd) for odd in range(3, 999, 2)]
+    side, other = next(pair for pair in sides if 2**32 < pair[0] < 2**63)
+    with np.errstate(over="ignore"):
+        assert int(np.prod(np.array([other, side, 1]))) == points  # as 64 bits have it
+    write_file(path, {**arrays, "shape": np.array([other, side, 1])}, metadata)
+    with pytest.raises(InputError, match="do not fit together"):
+        load_table(path, planar)
+
+
 def test_a_shape_in_the_header_that_lies_is_refused(planar: Robot, path: Path, content: bytes) -> None:
     size = struct.unpack("<Q", content[:8])[0]
     header = json.loads(content[8 : 8 + size])

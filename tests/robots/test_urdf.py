@@ -80,6 +80,15 @@ def test_package_directories(tmp_path, write_urdf, xml, place):
     assert "package directory" in str(caught.value.hint)
 
 
+def test_a_package_is_not_left(tmp_path, write_urdf, xml):
+    (tmp_path / "my_robot").mkdir()
+    (tmp_path / "m.obj").write_text(OBJ)
+    shape = xml.mesh("package://my_robot/../m.obj")
+    path = write_urdf(xml.link("base"), xml.link("l1", shape), xml.joint("j1", "base", "l1"))
+    with pytest.raises(InputError, match="leaves its package"):
+        load_robot(path, package_dirs=[tmp_path])
+
+
 def test_visual_meshes_are_not_needed(write_urdf, xml):
     visual = '<visual><geometry><mesh filename="package://none/none.dae"/></geometry></visual>'
     assert (
@@ -194,6 +203,7 @@ def test_a_broken_mesh_is_named_without_our_stack(tmp_path, write_urdf, xml):
         (b'<?xml version="1.0" encoding="foo"?><robot/>', "not readable as XML"),
         (b"<sdf/>", "the root element is <sdf>, a URDF has <robot>"),
         (b'<!DOCTYPE a [<!ENTITY a "b">]><robot/>', "XML entities"),
+        ('<!DOCTYPE a [<!ENTITY a "b">]><robot/>'.encode("utf-16"), "XML entities"),
         (b'<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arm/></robot>', "contains xacro elements"),
     ],
 )

@@ -120,7 +120,7 @@ def check(seed: int, steps: int) -> dict[str, int]:
 
 @pytest.mark.timeout(7200)
 @pytest.mark.parametrize(
-    ("first", "draws"), [(0, 120), *[pytest.param(10_000 * k, 5_000, marks=pytest.mark.long) for k in range(1, 5)]]
+    ("first", "draws"), [(0, 80), *[pytest.param(10_000 * k, 5_000, marks=pytest.mark.long) for k in range(1, 5)]]
 )
 def test_every_answer_is_a_command_or_a_refusal(first: int, draws: int) -> None:
     total: dict[str, int] = {}

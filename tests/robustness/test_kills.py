@@ -19,22 +19,28 @@ BENCH = ["bench", "--scenario", "./small.yaml", "--trials", "400", "--seed", "3"
 BUILD = ["build-cdf", "planar", "--resolution", "60", "--starts", "48", "--jobs", "1", "--quiet"]
 
 
-def killed_until_done(words: list[str], kills: int, rng: random.Random, longest: float) -> int:
-    """Run ``words``, killing it and its workers ``kills`` times, each at a random moment; then let it finish."""
-    done = 0
-    for _ in range(kills):
-        process = subprocess.Popen(words, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+def killed(words: list[str], out: str, kills: int, seed: int) -> list[Path]:
+    """Run ``words`` into ``out``-0, killing it and its workers at random moments and starting it again until it ends;
+    then into ``out``-1, and so on until ``kills`` have struck. What was written."""
+    rng, struck, written = random.Random(seed), 0, []
+    whole = seconds([*words, "--out", out.format("whole")])
+    while struck < kills:
+        path = out.format(len(written))
+        process = subprocess.Popen(
+            [*words, "--out", path], start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+        )
         try:
-            process.wait(timeout=rng.uniform(0.5, longest))
+            process.wait(timeout=rng.uniform(0.1, whole))
         except subprocess.TimeoutExpired:
-            done += 1
-        else:
-            assert process.returncode == 0, process.stderr.read() if process.stderr else ""
-        os.killpg(process.pid, signal.SIGKILL) if process.poll() is None else None
-        process.communicate()
-    last = subprocess.run(words, capture_output=True, text=True, check=False)
-    assert last.returncode == 0, last.stderr
-    return done
+            os.killpg(process.pid, signal.SIGKILL)
+            struck += 1
+        _, said = process.communicate()
+        assert process.returncode in (0, -signal.SIGKILL), said
+        if process.returncode == 0:
+            written.append(Path(path))
+    path = out.format(len(written))
+    subprocess.run([*words, "--out", path], check=True, capture_output=True)
+    return [*written, Path(path)]
 
 
 def seconds(words: list[str]) -> float:
@@ -49,20 +55,18 @@ def seconds(words: list[str]) -> float:
 def test_a_bench_killed_again_and_again(jobs: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("small.yaml").write_text(SMALL)
-    whole = seconds([*CDFCTL, *BENCH, "--jobs", "2", "--out", "whole"])
-    words = [*CDFCTL, *BENCH, "--jobs", str(jobs), "--out", "torn"]
-    hit = killed_until_done(words, 25, random.Random(jobs), whole)
-    assert hit >= 5  # the rest found the bench ended
-    trials = [(tmp_path / store / "trials.jsonl").read_bytes() for store in ("torn", "whole")]
-    assert trials[0] == trials[1]
+    stores = killed([*CDFCTL, *BENCH, "--jobs", str(jobs)], "store-{}", 25, jobs)
+    whole = (tmp_path / "store-whole" / "trials.jsonl").read_bytes()
+    for store in stores:
+        assert (store / "trials.jsonl").read_bytes() == whole, store
 
 
 @pytest.mark.long
 @pytest.mark.timeout(7200)
 def test_a_build_killed_again_and_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    whole = seconds([*CDFCTL, *BUILD, "--out", "whole.safetensors"])
-    hit = killed_until_done([*CDFCTL, *BUILD, "--out", "torn.safetensors"], 20, random.Random(7), 0.7 * whole)
-    assert hit >= 3
-    assert Path("torn.safetensors").read_bytes() == Path("whole.safetensors").read_bytes()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["torn.safetensors", "whole.safetensors"]
+    tables = killed([*CDFCTL, *BUILD], "{}.safetensors", 20, 7)
+    whole = Path("whole.safetensors").read_bytes()
+    for table in tables:
+        assert table.read_bytes() == whole, table
+    assert {path.name for path in tmp_path.iterdir()} == {"whole.safetensors", *(table.name for table in tables)}

@@ -11,7 +11,7 @@ from cdfctl.errors import InputError
 from cdfctl.scenario.library import load_scenario
 from cdfctl.scenario.overrides import parse_override
 from cdfctl.simulation.assemble import assemble
-from cdfctl.simulation.journal import STEPS, JournalReader, is_going_on, journal, live_folder
+from cdfctl.simulation.journal import NEEDED, STEPS, JournalReader, is_going_on, journal, live_folder
 
 SETTINGS = ("controller.variant=sdf-tvcbf-qp", "simulation.time_limit=1.0")
 
@@ -94,7 +94,26 @@ def test_a_disk_that_fails_stops_the_journal_and_not_the_run(trial, tmp_path):
     assert "a-file" in kept.problem
 
 
-@pytest.mark.parametrize("header", [b"", b"{}\n", b"[1]\n", json.dumps({"format": "x", "version": 1}).encode() + b"\n"])
+def first_line(**changes: object) -> bytes:
+    good = {"format": "cdfctl-live", "version": 1, "fields": [[name, [1]] for name in sorted(NEEDED)]}
+    return json.dumps(good | changes).encode() + b"\n"
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        b"",
+        b"{}\n",
+        b"[1]\n",
+        b"[" * 50_000 + b"\n",
+        first_line(format="x"),
+        first_line(version=2),
+        first_line(fields=[["t", []]]),
+        first_line(fields=[["t", [-1]], *([name, []] for name in NEEDED)]),
+        first_line(fields=[["t", [10**9, 10**9]], *([name, []] for name in NEEDED - {"t"})]),
+        first_line(fields=[["evil", []], *([name, []] for name in NEEDED)]),
+    ],
+)
 def test_another_file_is_not_taken_for_one(trial, tmp_path, header):
     live = live_folder(tmp_path / "run")
     with journal(tmp_path / "run", trial.scenario, on=True) as kept:

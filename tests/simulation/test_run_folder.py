@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import time
+import zipfile
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -253,3 +254,40 @@ def test_damaged_foreign_or_newer_folder_is_one_clear_line(tmp_path: Path, how: 
 def test_default_name() -> None:
     result = a_result()
     assert default_folder(result.scenario, 7) == Path("runs/S1-dual-tvcbf-qp-3-7")
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("min_clearance_m", "0.1"), ("collision_time_s", 10**400), ("trial", [1]), ("outcome", "x" * 9), ("robot", 1)],
+)
+def test_a_document_of_wrong_types_is_refused(tmp_path: Path, name: str, value: object) -> None:
+    """Figures and pages print these."""
+    write_run(tmp_path / "run", a_result())
+    path = tmp_path / "run" / "result.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {name: value}))
+    with pytest.raises(InputError, match=name):
+        read_run(tmp_path / "run")
+
+
+def npy(shape: str, data: bytes) -> bytes:
+    """A ``.npy`` file whose header says ``shape``, whatever ``data`` there are."""
+    text = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}"
+    text += " " * (-(len(text) + 11) % 64) + "\n"
+    return b"\x93NUMPY\x01\0" + len(text).to_bytes(2, "little") + text.encode() + data
+
+
+@pytest.mark.parametrize("shape", ["(1000000000000000,)", "(10000000000000000000000,)", "(-1,)"])
+def test_an_array_that_says_it_is_larger_than_memory(tmp_path: Path, shape: str) -> None:
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        archive.writestr("t.npy", npy(shape, bytes(80)))
+    with pytest.raises(ValueError, match=r"."):
+        read_npz(tmp_path / "a.npz")
+
+
+def test_an_archive_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
+    count = 40_000_000
+    with zipfile.ZipFile(tmp_path / "a.npz", "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        archive.writestr("t.npy", npy(f"({count},)", bytes(8 * count)))
+    assert (tmp_path / "a.npz").stat().st_size < 2e6
+    with pytest.raises(ValueError, match="twenty times"):
+        read_npz(tmp_path / "a.npz")

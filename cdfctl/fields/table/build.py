@@ -102,7 +102,12 @@ def build_table(
         return chunk_contacts(body, points[first : first + CHUNK], make_starts(first, points), workspace.tools)
 
     with PartialBuild(target, _key(robot, parameters)) as partial:
-        done = {i: arrays for i in range(len(firsts)) if (arrays := partial.read(i)) is not None}
+        kept = {i: partial.read(i) for i in range(len(firsts))}
+        done = {
+            i: arrays
+            for i, arrays in kept.items()
+            if arrays is not None and _is_chunk(arrays, len(points[firsts[i] : firsts[i] + CHUNK]), body)
+        }
         _report(progress, done, points)
         missing = [i for i in range(len(firsts)) if i not in done]
         pool = ThreadPoolExecutor(jobs or os.cpu_count() or 1)
@@ -171,6 +176,21 @@ def chunk_contacts(body: Body, points: Array, starts: Array, tools: Tools) -> di
     all_contacts(body, np.ascontiguousarray(points), starts, KEEP_CLEAR, tools, count, contacts)
     kept = np.arange(MOST) < count[:, :, None]
     return {"count": count.astype(np.int16), "q": contacts[kept].astype(np.float32)}
+
+
+def _is_chunk(arrays: dict[str, NDArray[Any]], points: int, body: Body) -> bool:
+    """Whether ``arrays``, as a file gave them, are what :func:`chunk_contacts` gives for this many points."""
+    if arrays.keys() != {"count", "q"}:
+        return False
+    count, q = arrays["count"], arrays["q"]
+    return (
+        count.dtype == np.int16
+        and count.shape == (points, len(body.joint))
+        and bool(np.all((count >= 0) & (count <= MOST)))
+        and q.dtype == np.float32
+        and q.shape == (int(count.sum()), len(body.chain.parent))
+        and bool(np.isfinite(q).all())
+    )
 
 
 def assemble_table(grid: Grid, chunks: list[dict[str, NDArray[Any]]]) -> Table:

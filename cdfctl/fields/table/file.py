@@ -12,6 +12,7 @@ import json
 import os
 import struct
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdfctl.errors import InputError, MissingError
+from cdfctl.reading import check_regular, make_way
 
 Arrays = Mapping[str, NDArray[Any]]
 TYPES = {"int64": "I64", "int16": "I16", "float32": "F32", "float64": "F64"}
@@ -49,7 +51,7 @@ def write_file(path: Path, arrays: Arrays, metadata: Mapping[str, str]) -> None:
     beside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with beside.open("wb") as file:
+        with make_way(beside).open("xb") as file:
             file.write(struct.pack("<Q", len(text)) + text)
             for name in order:
                 file.write(_bytes(arrays[name]))
@@ -57,9 +59,9 @@ def write_file(path: Path, arrays: Arrays, metadata: Mapping[str, str]) -> None:
             os.fsync(file.fileno())
         beside.replace(path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+        raise InputError(f"{path}: cannot be written: {error.strerror}", "give another --out, or make room") from None
     finally:
-        if beside.parent.is_dir():
+        with suppress(OSError):
             beside.unlink(missing_ok=True)
 
 
@@ -103,6 +105,7 @@ def read_metadata(path: Path) -> dict[str, str]:
     if not path.exists():
         raise MissingError(f"{path}: no such file")
     try:
+        check_regular(path)
         with safe_open(path, framework="np") as file:
             return dict(file.metadata() or {})
     except (SafetensorError, OSError) as error:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from cdfctl.errors import CdfctlError, InputError
 from cdfctl.fields.table.file import read_file, write_file
+from cdfctl.reading import make_way, read_bytes
 
 
 class PartialBuild:
@@ -45,14 +46,23 @@ class PartialBuild:
             raise InputError(
                 f"{self.folder}: another build of this table is running", hint="wait for it, or use another --out"
             ) from None
+        try:
+            self._tidy()
+        except OSError as error:
+            os.close(self._lock)
+            raise InputError(
+                f"{error.filename or self.folder}: {error.strerror}", hint=f"remove {self.folder}, or use another --out"
+            ) from None
+        return self
+
+    def _tidy(self) -> None:
         key_file = self.folder / "key"
-        if not key_file.exists() or key_file.read_text(errors="replace") != self._key:
+        if not key_file.exists() or read_bytes(key_file) != self._key.encode():
             for path in self.folder.glob("*.chunk"):
                 path.unlink()
-            key_file.write_text(self._key)
+            make_way(key_file).write_text(self._key)
         for path in self.folder.glob(".*.tmp"):  # of a build that was killed
             path.unlink()
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

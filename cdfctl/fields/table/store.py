@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 import shlex
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -188,7 +189,7 @@ def _check_arrays(path: Path, table: Table, robot: Robot, again: str) -> None:
         all(getattr(table, name).dtype == kind for name, kind in kinds.items())
         and table.origin.shape == table.shape.shape == (3,)
         and bool(np.all(table.shape > 0))
-        and table.first.shape == (int(np.prod(table.shape)) + 1,)
+        and table.first.shape == (math.prod(table.shape.tolist()) + 1,)  # in whole numbers, which do not run over
         and table.q.shape == (entries, robot.n)
         and table.first[0] == 0
         and table.first[-1] == entries

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cdfctl.errors import InputError
+from cdfctl.reading import make_way
 from cdfctl.report.figures.style import need_matplotlib, styled
 
 if TYPE_CHECKING:
@@ -50,9 +52,10 @@ def save_figure(figure: Figure, path: Path, dpi: int = DPI) -> None:
             if engine is not None:  # once: saving would lay everything out twice
                 engine.execute(figure)
                 figure.set_layout_engine("none")
-            figure.savefig(draft, format=suffix[1:], dpi=dpi, metadata=METADATA[suffix])
+            figure.savefig(make_way(draft), format=suffix[1:], dpi=dpi, metadata=METADATA[suffix])
         draft.replace(path)
     except OSError as error:
         raise InputError(f"cannot write {path}: {error.strerror or error}") from None
     finally:
-        draft.unlink(missing_ok=True)
+        with suppress(OSError):
+            draft.unlink(missing_ok=True)

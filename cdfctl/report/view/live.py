@@ -26,7 +26,7 @@ class Following:
         self._body = Body(self._reader.scenario)
         trajectory = self._reader.poll()
         if trajectory is None:
-            raise InputError(f"{folder}: the run in progress has no step yet")
+            raise InputError(f"{folder}: the run in progress has no step yet", "wait for it")
         self.replay = Replay(self._body, trajectory)
         self.run: Run | None = None
         self.complete = False

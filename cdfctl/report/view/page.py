@@ -12,6 +12,7 @@ import itertools
 import json
 import math
 import os
+from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from cdfctl.errors import InputError
+from cdfctl.reading import make_way
 from cdfctl.report.view.chart_html import LEFT, RIGHT, WIDTH, ChartPanel
 from cdfctl.report.view.charts import Chart, charts_of, clearance_curve
 from cdfctl.report.view.replay import Replay
@@ -83,10 +85,11 @@ def write_page(path: Path, text: str) -> None:
     check_page(path)
     draft = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        draft.write_text(text, encoding="utf-8")
+        make_way(draft).write_text(text, encoding="utf-8")
         draft.replace(path)
     except OSError as error:
-        draft.unlink(missing_ok=True)
+        with suppress(OSError):
+            draft.unlink(missing_ok=True)
         raise InputError(f"cannot write {path}: {error.strerror or error}") from None
 
 

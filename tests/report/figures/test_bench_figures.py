@@ -129,7 +129,7 @@ def test_every_figure_can_be_drawn_at_both_widths(plain, grid, width):
         ("manifest.json", json.dumps({"format": "cdfctl-bench", "version": 1}), "not the manifest"),
         ("trials.jsonl", "", "without a finished trial"),
         ("trials.jsonl", "nonsense\n", "damaged: not a trial"),
-        ("timing.jsonl", "{}\n", "lacks a column"),
+        ("timing.jsonl", "{}\n", "damaged: not the times of a trial"),
     ],
 )
 def test_a_damaged_store_is_one_line(plain, tmp_path, name, text, message):
