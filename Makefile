@@ -11,7 +11,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install --progre
 INPUTS := pyproject.toml constraints.txt
 SCENARIO ?= C1
 
-.PHONY: help run test coverage lint types layers docs clean
+.PHONY: help run test coverage bench lint types layers docs clean
 
 help:  ## list these targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -24,6 +24,9 @@ test: $(STAMPS)/test  ## set up, then run the tests on all cores
 
 coverage: $(STAMPS)/test  ## the same with coverage of lines and branches, which takes a quarter longer
 	$(BIN)/python -m pytest --numprocesses=logical --dist=loadgroup --cov --cov-report=term $(ARGS)
+
+bench: $(STAMPS)/test  ## time the control step and what it grows with, beside the goals
+	$(BIN)/python tests/benchmarks $(ARGS)
 
 lint: $(STAMPS)/lint  ## style and format of the code
 	$(BIN)/ruff check .

@@ -195,6 +195,24 @@ def test_sheets_are_distinct_contacts(planar) -> None:
     assert np.min(answer.contact_q[:, 0]) < 0.0 < np.max(answer.contact_q[:, 0])
 
 
+def test_a_ball_between_two_links_gives_a_row_of_each(planar) -> None:
+    """In the notch of the folded arm both contacts are near q and near each other, on opposite sides: at the margin of
+    one, only the other's row keeps the arm from being pushed into it."""
+    q, p = np.array([0.0, 2.4]), np.array([1.149, 0.33])
+    answer = make_field("cdf", planar).contacts(q, ball(p), sheets=4)
+    turn = math.atan2(p[1], p[0]) - math.asin(RADIUS / math.hypot(*p))  # of joint 1 alone, up to contact with link 1
+    near = q[0] + np.linspace(-0.1, 0.1, 401)
+    elbow = LENGTH * np.stack([np.cos(near), np.sin(near)], axis=1)
+    relative = p - elbow
+    bend = np.arctan2(relative[:, 1], relative[:, 0]) - np.arcsin(RADIUS / np.linalg.norm(relative, axis=1)) - near
+    other = np.linalg.norm(np.stack([near, bend % (2.0 * math.pi)], axis=1) - q, axis=1).min()
+    assert max(turn, other) < 0.05
+    for link, expected in ((0, turn), (1, other)):
+        assert answer.d[answer.link == link].min() == pytest.approx(expected, abs=1e-4)
+    here = [answer.contact_q[answer.link == link][0] for link in (0, 1)]
+    assert np.linalg.norm(here[0] - here[1]) < 0.1
+
+
 def test_both_links_in_penetration_are_both_clear_at_the_contact(planar) -> None:
     q = np.array([0.3, 3.0])  # folded: both links run through the ball
     p = np.array([1.4 * math.cos(0.3), 1.4 * math.sin(0.3)])
