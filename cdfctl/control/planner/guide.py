@@ -1,6 +1,12 @@
-"""The search of :mod:`cdfctl.control.planner.lattice` from step to step: when it goes on, and when it begins anew."""
+"""The search of :mod:`cdfctl.control.planner.lattice` from step to step: when it goes on, and when it begins anew.
+
+There are two lattices. The one with wide cells is searched first: it has an eighth as many of them as the other, and
+most ways that are there are on both.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,19 +19,21 @@ from cdfctl.control.planner.tree import Tree
 from cdfctl.robots.robot import Robot
 from cdfctl.types import Array
 
+WIDTHS = 0.4, 0.2  # rad or m: about the width of a cell
 STALE = 0.05  # m: an obstacle that is, or in a second will be, so far from where it was predicted makes dead cells void
 
 
 class Guide:
-    """One lattice, kept while its goal stays, its layers last and the obstacles move as predicted."""
+    """Lattices, kept while their goal stays, their layers last and the obstacles move as predicted."""
 
     def __init__(self, robot: Robot, horizon: float, dt: float) -> None:
         self._robot, self._horizon, self._dt = robot, horizon, dt
+        self._goal = np.zeros(robot.n)
         self.reset()
 
     def reset(self) -> None:
         """Forget the steps so far."""
-        self._lattice: Lattice | None = None
+        self._lattices: Sequence[Lattice] = ()
         self._now = 0.0
 
     def pass_on(self) -> None:
@@ -34,11 +42,12 @@ class Guide:
 
     def begin(self, course: Course, aim: Aim) -> None:
         """A step at which no plan is at hand."""
-        if self._lattice is None or not np.array_equal(self._goal, aim.goal) or self._now > EXTRA or self._void(course):
-            self._lattice, self._goal = new_lattice(self._robot, aim.goal, self._horizon, self._dt), aim.goal.copy()
-            self._sets, self._line, self._now = course.sets, course.line.copy(), 0.0
-        leave(self._lattice)
-        self.found = -1
+        if not self._lattices or not np.array_equal(self._goal, aim.goal) or self._now > EXTRA or self._void(course):
+            self._lattices = [new_lattice(self._robot, aim.goal, w, self._horizon, self._dt) for w in WIDTHS]
+            self._goal, self._sets, self._line, self._now = aim.goal.copy(), course.sets, course.line.copy(), 0.0
+        for lattice in self._lattices:
+            leave(lattice)
+        self._level, self.found = 0, -1
 
     def _void(self, course: Course) -> bool:
         if course.sets is not self._sets:
@@ -54,11 +63,12 @@ class Guide:
         The way, or as far as it has been followed, is then in ``tree.move``, and ``found`` says how many motions it
         has: -1 for none.
         """
-        lattice = self._lattice
-        assert lattice is not None
+        lattice = self._lattices[self._level]
         done = find(arm, course, aim, lattice, q, self._now, effort, space)
         count = int(lattice.state[3])
         self.found = count if 0 < count <= len(tree.tau) else -1
         if self.found > 0:
             tree.move[:count], tree.tau[:count] = lattice.move[:count], lattice.tau[:count]
+        if lattice.state[2] == 1 and self._level + 1 < len(self._lattices):
+            self._level, done = self._level + 1, False
         return done

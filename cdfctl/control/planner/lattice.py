@@ -24,7 +24,6 @@ from cdfctl.robots.robot import Robot
 from cdfctl.types import Array, BoolArray, IntArray
 
 JOINTS = 2  # robots with more have too many cells
-WIDTH = 0.2  # rad or m: about a cell's width
 EXTRA = 4.0  # s: the layers go that far beyond the horizon, and are used so long
 NEAR = 3  # layers to whose cells the robot may go straight from where it is
 TRIES = 12  # nodes of a way from which the straight one is tried
@@ -59,22 +58,22 @@ class Lattice(NamedTuple):
     tau: Array
 
 
-def new_lattice(robot: Robot, goal: Array, horizon: float, dt: float) -> Lattice:
-    """Cells around ``goal`` (2,), none of them dead."""
+def new_lattice(robot: Robot, goal: Array, width: float, horizon: float, dt: float) -> Lattice:
+    """Cells of about ``width`` (rad or m) around ``goal`` (2,), none of them dead."""
     limit = robot.velocity_limit
-    layer = dt * max(1, round(WIDTH / (float(limit.max()) * dt)))
-    width, origin, count = limit * layer, np.zeros(JOINTS, dtype=np.int64), [0] * JOINTS
+    layer = dt * max(1, round(width / (float(limit.max()) * dt)))
+    wide, origin, count = limit * layer, np.zeros(JOINTS, dtype=np.int64), [0] * JOINTS
     for j in range(JOINTS):
         if robot.continuous[j]:
-            count[j] = ceil(2.0 * pi / width[j])
-            width[j] = 2.0 * pi / count[j]
+            count[j] = ceil(2.0 * pi / wide[j])
+            wide[j] = 2.0 * pi / count[j]
         else:
-            origin[j] = floor((goal[j] - robot.lower[j]) / width[j])
-            count[j] = int(origin[j]) + 1 + floor((robot.upper[j] - goal[j]) / width[j])
+            origin[j] = floor((goal[j] - robot.lower[j]) / wide[j])
+            count[j] = int(origin[j]) + 1 + floor((robot.upper[j] - goal[j]) / wide[j])
     K = ceil((horizon + EXTRA) / layer)
     return Lattice(
         layer=layer,
-        width=width,
+        width=wide,
         wraps=np.asarray(robot.continuous, dtype=np.bool_),
         origin=origin,
         seen=np.zeros((K, *count), dtype=np.uint8),
@@ -117,7 +116,7 @@ def _follow(
     """Follow edges until the goal is reached, or no more are to be followed: whether it is."""
     state, way, seen, layer, at = lattice.state, lattice.way, lattice.seen, lattice.layer, lattice.at
     K, u = seen.shape[0], lattice.move[seen.shape[0]]
-    first = int(floor(now / layer + 1e-6)) + 1
+    first = floor(now / layer + 1e-6) + 1
     while space.looks[0] < effort and state[2] == 0:
         s = int(state[0])
         if s == 0:
@@ -178,7 +177,7 @@ def _near(lattice: Lattice, aim: Aim, q: Array, n: int, order: int) -> int:
     u = aim.goal[n] - q[n]
     if lattice.wraps[n]:
         u -= 2.0 * pi * floor(u / (2.0 * pi) + 0.5)
-    cell = lattice.origin[n] - int(floor(u / lattice.width[n] + 0.5))
+    cell = lattice.origin[n] - floor(u / lattice.width[n] + 0.5)
     return int(cell + (NEAR - order) * (1 if u >= 0.0 else -1))
 
 

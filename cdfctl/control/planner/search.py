@@ -50,8 +50,10 @@ def search(
     stream: Stream,
     space: Space,
 ) -> int:
-    """Try candidates from number ``first`` on, up to ``candidates`` while a plan is free and ``enough`` while none is, or
-    until ``effort``, or ``search_effort`` while none is, distances have been evaluated.
+    """Try candidates from number ``first`` on.
+
+    Up to ``candidates`` are tried while a plan is free and ``enough`` while none is, or until ``effort``, or
+    ``search_effort`` while none is, distances have been evaluated.
 
     Candidate 0 is the straight way, the others are drawn; but first the ``given`` motions in ``tree.move`` are tried,
     where that is not negative. Returns the number to go on with; ``enough`` means that all is done.
