@@ -42,6 +42,11 @@ def test_it_solves_a_suite_of_the_paper_and_records_its_plans():
     np.testing.assert_allclose(ends, [[-2.7, 0.5]] * N, atol=1e-9)
 
 
+def test_it_finds_a_narrow_way_that_random_motions_miss():
+    """The one plan that solves this set-up goes at full speed from the first step on."""
+    assert run("X1", "seed=1", trial=98).verdict.outcome == "reached"
+
+
 def test_a_scenario_gives_the_same_run_twice():
     first, second = (run("S2", trial=3).trajectory for _ in range(2))
     np.testing.assert_array_equal(first.q, second.q)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 
@@ -10,16 +11,21 @@ import numpy as np
 
 from cdfctl.control.planner.arm import arm_of
 from cdfctl.control.planner.course import Course
+from cdfctl.control.planner.guide import Guide
+from cdfctl.control.planner.lattice import JOINTS
 from cdfctl.control.planner.march import Space, new_space
 from cdfctl.control.planner.plan import Aim, new_plan, shift
 from cdfctl.control.planner.random import new_stream
 from cdfctl.control.planner.search import BOOST, search
-from cdfctl.control.planner.tree import new_tree
+from cdfctl.control.planner.tree import new_tree, plant, recall
 from cdfctl.robots.robot import Robot
 from cdfctl.types import Array
 
-SLICE = 5_000.0  # work between two looks at the clock, about 0.1 ms
+SLICE = 20_000.0  # work between two looks at the clock, about 0.3 ms; none are taken without a budget
 WORK = 60.0  # a step's work, for each candidate and joint: where trying is dear, fewer are tried
+GUIDED = 4.0  # times as much for a guide, where no plan is at hand
+SAVED = 0.25  # of it a step adds to what may be taken where no plan is free,
+BURST = 16.0  # up to so many times a step's
 
 
 @dataclass(frozen=True)
@@ -58,6 +64,23 @@ class Found:
     q: Array
 
 
+class _Clock:
+    """Says when a step's budget (s) will not do for another slice as long as the last."""
+
+    def __init__(self, budget: float) -> None:
+        self._began = self._last = time.perf_counter()
+        self._budget, self._over = budget, False
+
+    def over(self) -> bool:
+        """To be asked before every slice; once it is over, it stays so."""
+        if self._over:
+            return True
+        now = time.perf_counter()
+        slice_, self._last = now - self._last, now
+        self._over = now - self._began + slice_ > self._budget
+        return self._over
+
+
 class Planner:
     """Plans for one robot. It carries a plan from step to step: one instance a loop."""
 
@@ -68,12 +91,15 @@ class Planner:
         self._best = new_plan(settings.segments, robot.n)
         self._tree = new_tree(2 * BOOST * settings.candidates + settings.segments, settings.segments, robot.n)
         self._space: Space = new_space(self._arm, 0)
+        self._guide = Guide(robot, settings.horizon, dt) if robot.n == JOINTS else None
         self.reset()
 
     def reset(self) -> None:
         """Forget the steps so far."""
         self._best.value[0], self._best.tau[:] = inf, 0.0
-        self._stream = new_stream(self._settings.seed)
+        self._stream, self._saved = new_stream(self._settings.seed), inf
+        if self._guide is not None:
+            self._guide.reset()
 
     def plan(self, q: Array, course: Course, goal: Array, speed: Array, stay: float) -> Found:
         """The best plan from ``q`` (n,).
@@ -99,31 +125,56 @@ class Planner:
             horizon=settings.horizon,
         )
         shift(self._best, self._dt)
-        began, first, work = time.perf_counter(), 0, 0.0
-        slice_began = began
-        # As for the candidates, there is more work to be done while no plan is free.
-        while first < BOOST * settings.candidates and work < settings.candidates * robot.n * WORK * (
-            1 if self._best.value[1] == inf and first > 0 else BOOST
-        ):
-            first = search(
-                self._arm,
-                course,
-                aim,
-                self._best,
-                self._tree,
-                q,
-                first,
-                settings.candidates,
-                SLICE,
-                self._stream,
-                self._space,
-            )
-            work += float(self._space.looks[0])
-            now = time.perf_counter()
-            if now - began + (now - slice_began) > settings.budget:
-                break  # another slice may not fit
-            slice_began = now
+        plant(self._tree, q)
+        if self._guide is not None:
+            self._guide.pass_on()
+        search, clock = self._searching(course, aim, q), _Clock(settings.budget)
+        most = settings.candidates * robot.n * WORK
+        self._saved = min(self._saved + SAVED * most, BURST * most)
+        given, enough, work = recall(self._best, self._tree), BOOST * settings.candidates, 0.0
+        first = 0
+        if self._guide is not None:
+            first = search(0, given, enough, 0.0, 0.0)  # the plan of the last step, and the straight way
+            given = -1
+            if self._best.value[1] < inf:
+                given, work = self._guided(self._guide, course, aim, q, clock, GUIDED * most + self._saved)
+                self._saved -= max(0.0, work - GUIDED * most)
+                first = search(first, given, settings.candidates, 0.0, 0.0)
+                given, work, enough = -1, 0.0, settings.candidates
+        # While no plan is free a step may take what those before it have saved.
+        more = most + min((BOOST - 1) * most, self._saved)
+        while first < enough and work < (most if self._best.value[1] == inf else more):
+            if clock.over():
+                break
+            part = SLICE if settings.budget < inf else inf
+            first = search(first, given, enough, min(part, most - work), min(part, more - work))
+            work, given = work + float(self._space.looks[0]), -1
+        self._saved -= max(0.0, work - most)
         return self._found(q)
+
+    def _searching(self, course: Course, aim: Aim, q: Array) -> Callable[[int, int, int, float, float], int]:
+        """The search of a step, but for the numbers that say how far it goes."""
+
+        def part(first: int, given: int, enough: int, free: float, effort: float) -> int:
+            return search(
+                self._arm, course, aim, self._best, self._tree, q, first, given, self._settings.candidates, enough,
+                free, effort, self._stream, self._space,
+            )  # fmt: skip
+
+        return part
+
+    def _guided(
+        self, guide: Guide, course: Course, aim: Aim, q: Array, clock: _Clock, effort: float
+    ) -> tuple[int, float]:
+        """The best that the guide finds with ``effort``, into the tree's motions: how many, -1 for none; the work."""
+        work, part = 0.0, SLICE if self._settings.budget < inf else inf
+        guide.begin(course, aim)
+        while work < effort and not clock.over():
+            done = guide.find(self._arm, course, aim, q, min(part, effort - work), self._tree, self._space)
+            work += float(self._space.looks[0])
+            if done:
+                break
+        return guide.found, work
 
     def _found(self, q: Array) -> Found:
         best, dt = self._best, self._dt

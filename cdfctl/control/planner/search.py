@@ -19,7 +19,6 @@ from cdfctl.control.planner.tree import (
     Tree,
     add_node,
     keep,
-    plant,
     propose_change,
     propose_random,
     propose_toward,
@@ -43,37 +42,35 @@ def search(
     tree: Tree,
     q: Array,
     first: int,
+    given: int,
     candidates: int,
+    enough: int,
     effort: float,
+    search_effort: float,
     stream: Stream,
     space: Space,
 ) -> int:
-    """Try candidates from number ``first`` on, until there are enough or ``effort`` distances have been evaluated.
+    """Try candidates from number ``first`` on.
 
-    Candidate 0 is the plan of the last step, in ``best``; candidate 1 is the straight way. Returns the number to go on
-    with; ``BOOST * candidates`` means that all is done.
+    Up to ``candidates`` are tried while a plan is free and ``enough`` while none is, or until ``effort``, or
+    ``search_effort`` while none is, distances have been evaluated.
+
+    Candidate 0 is the straight way, the others are drawn; but first the ``given`` motions in ``tree.move`` are tried,
+    where that is not negative. Returns the number to go on with; ``enough`` means that all is done.
     """
     space.looks[0] = 0.0
-    n, enough = q.shape[0], BOOST * candidates
+    if given >= 0:
+        # They were free, but for the STEP that a check may miss: seen from another instant, that must not end them.
+        _follow(arm, course, aim, best, tree, 0, given, STEP, space)
     least_cost = straight(aim, q, tree.work) + GOOD
     for c in range(first, enough):
-        free = c > 1 and best.value[1] == inf
+        free = c > 0 and best.value[1] == inf
         if free and (c >= candidates or best.value[0] <= least_cost):
             return enough
-        if space.looks[0] >= effort:
+        if c > 0 and space.looks[0] >= (effort if free else search_effort):
             return c
-        node, count, ease = 0, 0, 0.0
-        if c == 0:
-            # It was free, but for the STEP that a check may miss: seen from another instant, that must not end it.
-            ease = STEP
-            plant(tree, q)
-            while count < tree.tau.shape[0] and best.tau[count] > 0.0:
-                tree.tau[count] = best.tau[count]
-                for j in range(n):
-                    tree.move[count, j] = best.u[count, j]
-                count += 1
-            best.value[0], best.value[1] = inf, 0.0
-        elif c > 1:
+        node, count = 0, 0
+        if c > 0:
             if free and uniform(stream) < CHANGE:
                 count = propose_change(aim, best, tree, stream)
             else:
@@ -84,7 +81,7 @@ def search(
                     node = propose_random(aim, tree, stream)
             if count == 0 or node < 0:
                 continue
-        _follow(arm, course, aim, best, tree, node, count, ease, space)
+        _follow(arm, course, aim, best, tree, node, count, 0.0, space)
     return enough
 
 

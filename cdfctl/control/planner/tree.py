@@ -68,6 +68,19 @@ def plant(tree: Tree, q: Array) -> None:
 
 
 @njit
+def recall(best: Plan, tree: Tree) -> int:
+    """The motions of the best plan, which is one no more, into ``move``: how many there are."""
+    count = 0
+    while count < tree.tau.shape[0] and best.tau[count] > 0.0:
+        tree.tau[count] = best.tau[count]
+        for j in range(tree.work.shape[0]):
+            tree.move[count, j] = best.u[count, j]
+        count += 1
+    best.value[0], best.value[1] = inf, 0.0
+    return count
+
+
+@njit
 def add_node(tree: Tree, parent: int, u: Array, tau: float, least: float) -> int:
     """The node after ``tau`` at ``u`` from ``parent``; -1 where the tree is full."""
     new = int(tree.used[0])
