@@ -64,7 +64,8 @@ def _names(data: dict[str, Any]) -> Iterator[Complaint]:
 
 def _members(item: object) -> int:
     """How many obstacles an item becomes when drawn."""
-    counts = [_get(item, "count"), *(_get(item, "grid", "counts") or ())]
+    grid = _get(item, "grid", "counts")
+    counts = [_get(item, "count"), *(grid if isinstance(grid, list | tuple) else ())]
     known = [c for c in counts if isinstance(c, int) and not isinstance(c, bool) and 0 < c <= MOST_COPIES]
     return min(math.prod(known), MOST_OBSTACLES)
 
@@ -104,7 +105,7 @@ def _physics_steps(data: dict[str, Any]) -> Iterator[Complaint]:
     dt, step = _get(data, "simulation", "dt"), plant.get("timestep", MujocoConfig.model_fields["timestep"].default)
     if not (_is_number(dt) and _is_number(step) and dt > 0.0 and step > 0.0):
         return
-    count = round(dt / step)
+    count = round(min(dt / step, 1e9))
     if count < 1 or abs(count * step - dt) > 1e-9:
         what = "is longer than" if step > dt else "does not divide"
         parts = next((k for k in (1, 2, 4, 5, 8, 10, 16, 20, 25, 40, 50) if k >= dt / step), 100)

@@ -105,6 +105,16 @@ def test_other_formats_are_refused(planar: Robot, path: Path, found: str, words:
     assert "build-cdf planar" in str(caught.value)
 
 
+@pytest.mark.parametrize("text", ["[" * 100_000, "[1]", "{}", '{"radius": "x"}', ""])
+def test_metadata_that_make_no_sense_are_refused(planar: Robot, path: Path, text: str) -> None:
+    arrays, metadata = read_file(path)
+    for name in ("parameters", "accuracy"):
+        write_file(path, arrays, {**metadata, name: text})
+        if (name, text) != ("parameters", "{}"):  # the defaults
+            with pytest.raises(InputError):
+                load_table(path, planar)
+
+
 def test_a_table_of_another_robot_is_refused_with_the_command(planar: Robot, path: Path) -> None:
     with pytest.raises(InputError, match="another robot") as caught:
         load_table(path, load_robot("z1"))

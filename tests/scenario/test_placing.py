@@ -103,6 +103,7 @@ CASES = [
     (f"{APPROACH}\n    count: 0", "count", "must be from 1 to 1000, found 0"),
     (f"{APPROACH}\n    count: {{uniform: [1, 2]}}", "count", "expected a whole number, found a mapping with uniform"),
     (f"{APPROACH}\n    grid: {{counts: [2, 2], step: [1, 1, 1]}}", "grid.counts", "expected a list of 3 whole numbers"),
+    (f"{APPROACH}\n    grid: {{counts: 3.5, step: [1, 1, 1]}}", "grid.counts", "expected a list of 3 whole numbers"),
     (f"{APPROACH}\n    grid: {{counts: [900, 900, 1], step: [1, 1, 1]}}", "grid", "810000 obstacles are too many"),
     (f"{MOTION}\n    {RULE}", "redraw_within.segment", "segment and motion exclude each other"),
     (f"{APPROACH}\n    redraw_within: {{start: -1}}", "redraw_within.start", "must be at least 0, found -1"),

@@ -20,6 +20,7 @@ from cdfctl.fields.kernel.starts import Table
 from cdfctl.fields.table.accuracy import Accuracy
 from cdfctl.fields.table.build import BuildParameters
 from cdfctl.fields.table.file import read_file, read_metadata, write_file
+from cdfctl.reading import parse_json
 from cdfctl.robots.robot import Robot
 from cdfctl.robots.robot_file import shipped_names
 
@@ -175,9 +176,9 @@ def _stored(path: Path, arrays: dict[str, NDArray[Any]], metadata: dict[str, str
         table=Table(spacing=float(arrays.pop("spacing")[0]), **arrays),
         robot=metadata["robot"],
         robot_hash=metadata["robot_hash"],
-        parameters=BuildParameters(**json.loads(metadata["parameters"])),
+        parameters=BuildParameters(**parse_json(metadata["parameters"])),
         version=metadata["cdfctl"],
-        accuracy=Accuracy.of_document(json.loads(metadata["accuracy"])),
+        accuracy=Accuracy.of_document(parse_json(metadata["accuracy"])),
     )
 
 
