@@ -70,9 +70,35 @@ def compiled_in(folder: Path | None, function: Callable[..., Any], forceinline: 
     theirs = config.CACHE_DIR
     config.CACHE_DIR = str(folder or theirs)
     try:
-        return numba.njit(cache=folder is not None, forceinline=forceinline, **OPTIONS)(function)
+        dispatcher: Any = numba.njit(cache=folder is not None, forceinline=forceinline, **OPTIONS)(function)
     finally:
         config.CACHE_DIR = theirs
+    if folder is not None:
+        _forgive(dispatcher._cache)
+    return dispatcher
+
+
+def _forgive(kept: Any) -> None:
+    """Compile afresh what cannot be read back, and go on where it cannot be kept.
+
+    A disk that was full, or that lost its power, leaves files that are empty or cut short; numba would end with what
+    ``pickle`` says of them, at every start.
+    """
+    load, save = kept.load_overload, kept.save_overload
+
+    def load_or_none(*arguments: Any) -> Any:
+        try:
+            return load(*arguments)
+        except Exception:  # whatever a damaged pickle leads to
+            with contextlib.suppress(OSError):
+                kept.flush()
+            return None
+
+    def save_or_not(*arguments: Any) -> None:
+        with contextlib.suppress(OSError):
+            save(*arguments)
+
+    kept.load_overload, kept.save_overload = load_or_none, save_or_not
 
 
 def digest_of(*folders: Path) -> str:

@@ -34,6 +34,25 @@ def test_a_cache_place_that_cannot_be_made_is_no_hindrance(tmp_path: Path):
     assert answer.stdout.strip() == "32.0", answer.stderr
 
 
+def test_a_cache_that_cannot_be_read_is_made_anew(tmp_path: Path):
+    for suffix, size in ((".nbi", 0), (".nbc", 40), ("", 0)):
+        answer = run(ONE_FUNCTION, CDFCTL_CACHE=str(tmp_path))
+        assert answer.stdout.strip() == "32.0", answer.stderr
+        files = list(tmp_path.glob("kernels/*/**/*.nb*"))
+        assert files
+        assert all(path.stat().st_size > 40 for path in files)  # from the second time on: made anew
+        for path in files:
+            if path.suffix == suffix:
+                path.write_bytes(path.read_bytes()[:size])
+
+
+def test_a_cache_without_room_is_no_hindrance(tmp_path: Path):
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))\n"
+    answer = run(limit + ONE_FUNCTION, CDFCTL_CACHE=str(tmp_path))
+    assert answer.stdout.strip() == "32.0", answer.stderr
+    assert not [path for path in tmp_path.rglob("*.nbc") if path.stat().st_size]
+
+
 def test_the_kernel_runs_as_plain_python_for_a_debugger():
     script = (
         "from cdfctl.fields.sdf import SDF\n"
