@@ -136,14 +136,14 @@ def cheapest(found: Candidates, count: int, choice: Choice) -> int:
 
 
 @njit
-def like_a_marked(found: Candidates, count: int, candidate: int, choice: Choice) -> bool:
-    """Whether a candidate is near a marked one of the same piece and finite cost, and so on its way to it."""
+def marked_like(found: Candidates, count: int, candidate: int, choice: Choice) -> int:
+    """A marked candidate of the same piece and finite cost that the candidate is near, -1 for none."""
     for c in range(count):
         if c == candidate or not choice.marked[c] or not found.cost[c] < np.inf:
             continue
         if found.piece[c] == found.piece[candidate] and apart2(found, c, candidate) < ALIKE * ALIKE:
-            return True
-    return False
+            return c
+    return -1
 
 
 @njit

@@ -25,7 +25,7 @@ from cdfctl.fields.kernel.candidates import (
     cheapest,
     choose,
     choose_distinct,
-    like_a_marked,
+    marked_like,
     new_candidates,
     new_choice,
     unmark,
@@ -251,8 +251,8 @@ def _finish_best(
     thorough: bool,
     steps: int,
 ) -> None:
-    """Finish the ``warm`` remembered contacts, and then other candidates, the most promising first, until ``wanted``
-    are contacts or ``most`` of the others have been tried.
+    """Finish candidates, the most promising first, until ``wanted`` are contacts or ``most`` have been tried, and then
+    what is left of the ``warm`` remembered ones, which are nearly always contacts.
 
     If ``thorough``, more than ``most`` are tried as long as none was a contact. All that are left, and those that turn
     out to be none, or one that was found before, get an infinite cost.
@@ -261,19 +261,20 @@ def _finish_best(
     pieces = body.joint.shape[0]
     unmark(choice, count)
     contacts = 0
-    for c in range(pieces, pieces + warm):
-        contacts += _finish_new(body, q, parts, o, search, count, c, steps)
     tries = 0
     while contacts < wanted and (tries < most or (thorough and contacts == 0)):
         best = cheapest(found, count, choice)
         if best < 0:
             break
-        if like_a_marked(found, count, best, choice):
+        if marked_like(found, count, best, choice) >= 0:
             choice.marked[best] = True
             found.cost[best] = np.inf
             continue
         contacts += _finish_new(body, q, parts, o, search, count, best, steps)
         tries += 1
+    for c in range(pieces, pieces + warm):
+        if contacts < wanted and not choice.marked[c] and found.cost[c] < np.inf:
+            contacts += _finish_new(body, q, parts, o, search, count, c, steps)
     for c in range(count):
         if not choice.marked[c]:
             found.cost[c] = np.inf
@@ -281,16 +282,21 @@ def _finish_best(
 
 @njit
 def _finish_new(body: Body, q: Array, parts: Parts, o: int, search: Search, count: int, c: int, steps: int) -> int:
-    """Finish and mark candidate c; 1 where it is a contact that no marked one is, else 0 and an infinite cost.
+    """Finish and mark candidate c; 1 where it is a contact that no marked one is, else 0.
 
-    Where another piece penetrates, a candidate slides to that piece's contact: several may end in the same one.
+    Where another piece penetrates, a candidate slides to that piece's contact: several may end in the same one. Then
+    the nearer stays, the other gets an infinite cost.
     """
     found, choice = search.found, search.choice
     choice.marked[c] = True
     _finish(body, q, parts, o, search, c, steps)
-    if like_a_marked(found, count, c, choice):
-        found.cost[c] = np.inf
-    return 1 if found.cost[c] < np.inf else 0
+    if not found.cost[c] < np.inf:
+        return 0
+    other = marked_like(found, count, c, choice)
+    if other < 0:
+        return 1
+    found.cost[c if found.cost[c] >= found.cost[other] else other] = np.inf
+    return 0
 
 
 @njit
