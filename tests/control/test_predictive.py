@@ -13,6 +13,8 @@ from cdfctl.scenario.library import load_scenario
 from cdfctl.simulation.assemble import assemble
 from cdfctl.types import Box, Obstacle, Scene, Sphere
 
+pytestmark = pytest.mark.xdist_group("planner")  # one worker compiles it, not two at once
+
 NAME = "predictive-tvcbf"
 FEW = ["controller.candidates=64"]
 

@@ -17,6 +17,8 @@ from cdfctl.robots.robot import load_robot
 from cdfctl.simulation.clearance import nearest
 from cdfctl.types import Box, Capsule, Cylinder, Obstacle, PointCloud, Scene, Sphere
 
+pytestmark = pytest.mark.xdist_group("planner")  # one worker compiles it, not two at once
+
 MARGIN, RADIUS = 0.03, 0.3
 
 

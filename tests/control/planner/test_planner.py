@@ -16,6 +16,8 @@ from cdfctl.robots.robot import load_robot
 from cdfctl.simulation.judge import judge
 from cdfctl.types import Obstacle, Scene, Sphere, Trajectory
 
+pytestmark = pytest.mark.xdist_group("planner")  # one worker compiles it, not two at once
+
 MARGIN = 0.03
 GOAL = np.array([-2.7, 0.5])
 Q0 = np.array([2.5, 0.5])
