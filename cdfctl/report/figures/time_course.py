@@ -109,7 +109,7 @@ def barrier(axes: Axes, view: RunView, h: Array) -> None:
         axes.axhline(-view.margin, color=VERMILION, linewidth=0.8, linestyle="--")
     finite = h[np.isfinite(h)]
     if finite.size:
-        low, high = min(float(finite.min()), -view.margin), max(float(finite.max()), view.margin)
+        low, high = min(float(finite.min()), -view.margin), max(_ceiling(h), view.margin)
         pad = 0.06 * (high - low)
         axes.set_ylim(low - pad, high + pad)
 
@@ -119,6 +119,9 @@ def clearance(axes: Axes, view: RunView) -> None:
     times, found = view.clearance
     _obstacle_lines(axes, view, times, found)
     axes.axhline(0.0, color=VERMILION, linewidth=0.8, linestyle="--")
+    if found.shape[1] > MOST_LABELLED and np.isfinite(found).any():
+        top = max(_ceiling(found), 0.1)
+        axes.set_ylim(min(0.0, float(found.min())) - 0.06 * top, 1.06 * top)
     least = view.document.get("min_clearance_m")
     if least is not None:
         axes.axhline(least, color=BLACK, linewidth=0.7, linestyle=":")
@@ -141,6 +144,15 @@ def _obstacle_lines(axes: Axes, view: RunView, t: Array, values: Array) -> None:
     least = np.where(np.isnan(values).all(axis=1), np.nan, np.where(np.isnan(values), np.inf, values).min(axis=1))
     axes.plot(t, least, color=BLUE, label=f"least of {values.shape[1]} obstacles", **dots)
     legend_above(axes, 2)
+
+
+def _ceiling(values: Array) -> float:
+    """The greatest value to be shown of (N, m). Of many obstacles most are far: up to three times the least of all."""
+    values = np.where(np.isfinite(values), values, -np.inf)
+    if values.shape[1] <= MOST_LABELLED:
+        return float(values.max())
+    least = np.where(values > -np.inf, values, np.inf).min(axis=1)
+    return min(float(values.max()), 3.0 * float(least[np.isfinite(least)].max(initial=0.0)))
 
 
 def lyapunov(axes: Axes, view: RunView) -> None:
