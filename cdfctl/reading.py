@@ -9,6 +9,8 @@ from __future__ import annotations
 import errno
 import json
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +61,21 @@ def make_way(draft: Path) -> Path:
     if draft.is_symlink() or draft.exists():
         draft.unlink()
     return draft
+
+
+@contextmanager
+def drafted(path: Path, draft: Path) -> Iterator[Path]:
+    """Write ``path`` whole or not at all: to ``draft`` beside it first, which takes its name in the end.
+
+    Whatever stood in the place of the draft is removed before, and a draft that did not come to its end after. Raises
+    :class:`OSError`.
+    """
+    try:
+        yield make_way(draft)
+        draft.replace(path)
+    finally:
+        with suppress(OSError):
+            draft.unlink(missing_ok=True)
 
 
 def refuse_link(path: Path) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from cdfctl.errors import InputError
-from cdfctl.reading import MIB, make_way, parse_json, read_bytes, refuse_link
+from cdfctl.reading import MIB, drafted, parse_json, read_bytes, refuse_link
 from cdfctl.types import TrialKey
 
 Record = dict[str, Any]
@@ -136,10 +136,9 @@ def replace(path: Path, text: str) -> None:
     """Write a file whole or not at all. Raises :class:`InputError`."""
     draft = path.with_name(f".{path.name}.new")
     try:
-        make_way(draft).write_text(text, encoding="utf-8")
-        draft.replace(path)
+        with drafted(path, draft):
+            draft.write_text(text, encoding="utf-8")
     except OSError as error:
-        unlink(draft)
         raise unwritable(path, error) from None
 
 

@@ -12,7 +12,6 @@ import json
 import os
 import struct
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdfctl.errors import InputError, MissingError
-from cdfctl.reading import check_regular, make_way
+from cdfctl.reading import check_regular, drafted
 
 Arrays = Mapping[str, NDArray[Any]]
 TYPES = {"int64": "I64", "int16": "I16", "float32": "F32", "float64": "F64"}
@@ -51,18 +50,14 @@ def write_file(path: Path, arrays: Arrays, metadata: Mapping[str, str]) -> None:
     beside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with make_way(beside).open("xb") as file:
+        with drafted(path, beside), beside.open("xb") as file:
             file.write(struct.pack("<Q", len(text)) + text)
             for name in order:
                 file.write(_bytes(arrays[name]))
             file.flush()
             os.fsync(file.fileno())
-        beside.replace(path)
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}", "give another --out, or make room") from None
-    finally:
-        with suppress(OSError):
-            beside.unlink(missing_ok=True)
 
 
 def read_file(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cdfctl.errors import InputError, MissingError
-from cdfctl.reading import make_way
+from cdfctl.reading import drafted
 from cdfctl.report.figures.field_map import both_maps, draw_map, draw_region, joint_axes, level_steps
 from cdfctl.report.figures.joint_space import axis_values, draw_path, target_map
 from cdfctl.report.figures.outline import Skeleton
@@ -75,14 +74,10 @@ def animate(view: RunView, fields: tuple[str, ...], path: Path, points: int = PO
     draft = path.with_name(f".{path.stem}.new{suffix}")
     times = frame_times(view, RATE[suffix])
     try:
-        with styled():
-            _write(view, fields[0], times, make_way(draft), RATE[suffix], points)
-        draft.replace(path)
+        with drafted(path, draft), styled():
+            _write(view, fields[0], times, draft, RATE[suffix], points)
     except OSError as error:
         raise InputError(f"cannot write {path}: {error.strerror or error}") from None
-    finally:
-        with suppress(OSError):
-            draft.unlink(missing_ok=True)
     return len(times)
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cdfctl.errors import InputError
-from cdfctl.reading import make_way
+from cdfctl.reading import drafted
 from cdfctl.report.figures.style import need_matplotlib, styled
 
 if TYPE_CHECKING:
@@ -47,15 +46,11 @@ def save_figure(figure: Figure, path: Path, dpi: int = DPI) -> None:
     suffix = path.suffix.lower()
     draft = path.with_name(f".{path.name}.new")
     try:
-        with styled():
+        with drafted(path, draft), styled():
             engine = figure.get_layout_engine()
             if engine is not None:  # once: saving would lay everything out twice
                 engine.execute(figure)
                 figure.set_layout_engine("none")
-            figure.savefig(make_way(draft), format=suffix[1:], dpi=dpi, metadata=METADATA[suffix])
-        draft.replace(path)
+            figure.savefig(draft, format=suffix[1:], dpi=dpi, metadata=METADATA[suffix])
     except OSError as error:
         raise InputError(f"cannot write {path}: {error.strerror or error}") from None
-    finally:
-        with suppress(OSError):
-            draft.unlink(missing_ok=True)

@@ -12,7 +12,6 @@ import itertools
 import json
 import math
 import os
-from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from cdfctl.errors import InputError
-from cdfctl.reading import make_way
+from cdfctl.reading import drafted
 from cdfctl.report.view.chart_html import LEFT, RIGHT, WIDTH, ChartPanel
 from cdfctl.report.view.charts import Chart, charts_of, clearance_curve
 from cdfctl.report.view.replay import Replay
@@ -85,11 +84,9 @@ def write_page(path: Path, text: str) -> None:
     check_page(path)
     draft = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        make_way(draft).write_text(text, encoding="utf-8")
-        draft.replace(path)
+        with drafted(path, draft):
+            draft.write_text(text, encoding="utf-8")
     except OSError as error:
-        with suppress(OSError):
-            draft.unlink(missing_ok=True)
         raise InputError(f"cannot write {path}: {error.strerror or error}") from None
 
 
