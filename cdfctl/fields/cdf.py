@@ -50,7 +50,7 @@ class CDF:
         self._parts = SceneParts()
         self._room, self._rows = (0, 1), new_contact_rows(0, 1, robot.n)
         self._names: tuple[str, ...] = ()
-        self._memory = new_memory(0, MOST_SHEETS + SPARE_MEMORY, robot.n)
+        self._memory = new_memory(0, MOST_SHEETS + SPARE_MEMORY, robot.n, len(self._body.joint))
 
     @cached_property
     def _work(self) -> Workspace:
@@ -104,10 +104,10 @@ class CDF:
         """The memory in the order of ``names``: that of obstacles no longer there is dropped."""
         if names is not self._names and names != self._names:
             old, places = self._memory, {name: i for i, name in enumerate(self._names)}
-            self._memory = new_memory(len(names), old.piece.shape[1], self.robot.n)
+            self._memory = new_memory(len(names), old.piece.shape[1], self.robot.n, old.tried.shape[1])
             for i, name in enumerate(names):
                 if name in places:
-                    for member in ("known", "piece", "x", "pose"):
+                    for member in ("known", "piece", "x", "motion", "steady", "tried", "pose"):
                         getattr(self._memory, member)[i] = getattr(old, member)[places[name]]
             self._memory.turn[:], self._memory.q[:] = old.turn, old.q
         self._names = names

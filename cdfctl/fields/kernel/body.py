@@ -121,11 +121,25 @@ def _place_joint(body: Body, q: Array, frames: Frames, c: int, i: int) -> None:
     z = rotate(r, axis)
     if chain.prismatic[i]:
         t = add(t, scale(q[i], z))
+    elif axis[2] == 1.0:
+        r = turn_about_z(r, q[i])
     else:
         r = compose(r, turn(axis, q[i]))
     store_rot(frames.rotation[c], i, r)
     store(frames.translation[c], i, t)
     store(frames.axis[c], i, z)
+
+
+@njit
+def turn_about_z(r: Rot, angle: float) -> Rot:
+    """R times the rotation by ``angle`` about z, the axis of most joints."""
+    s, c = sin(angle), cos(angle)
+    x, y, z = r
+    return (
+        (c * x[0] + s * x[1], c * x[1] - s * x[0], x[2]),
+        (c * y[0] + s * y[1], c * y[1] - s * y[0], y[2]),
+        (c * z[0] + s * z[1], c * z[1] - s * z[0], z[2]),
+    )
 
 
 @njit

@@ -6,6 +6,7 @@ import numpy as np
 
 from cdfctl.fields.kernel.body import Body, Frames, new_frames
 from cdfctl.fields.kernel.jit import njit
+from cdfctl.fields.kernel.joints import distance2
 from cdfctl.fields.kernel.structs import Struct
 from cdfctl.types import Array, BoolArray, IntArray
 
@@ -26,7 +27,9 @@ class Candidates(Struct):
         a, b, normal: (c, 3) witness points and normal in the world.
         slope: (c,) norm of g over the joints not at a limit.
         multiplier: (c,) λ, and ``residual`` (c,) the norm of z (c, n) = x - q + λ g over the joints free to move.
-        curvature: (c,) σ.
+        part: (c,) the part of the obstacle that is nearest.
+        corners: (c,) how many corners of the cores carry the nearest points, 0 where the cores touch; ``corner_a``,
+            ``corner_b`` (c, 4, 3) which ones, in the frame of the piece.
         cost: (c,) rad: the distance from q, and the linearised distance still to go to the surface.
         frames: where the joints are, in the ``place`` (c,) of each candidate: its own, or the last, the joints at q.
     """
@@ -42,7 +45,10 @@ class Candidates(Struct):
     multiplier: Array
     residual: Array
     z: Array
-    curvature: Array
+    part: IntArray
+    corners: IntArray
+    corner_a: Array
+    corner_b: Array
     cost: Array
     place: IntArray
     frames: Frames
@@ -70,7 +76,10 @@ def new_candidates(body: Body, c: int) -> Candidates:
         multiplier=np.zeros(c),
         residual=np.zeros(c),
         z=np.zeros((c, n)),
-        curvature=np.zeros(c),
+        part=np.zeros(c, dtype=np.int64),
+        corners=np.zeros(c, dtype=np.int64),
+        corner_a=np.zeros((c, 4, 3)),
+        corner_b=np.zeros((c, 4, 3)),
         cost=np.zeros(c),
         place=np.zeros(c, dtype=np.int64),
         frames=new_frames(body, c + 1),
@@ -111,7 +120,7 @@ def _select(found: Candidates, count: int, most: int, gap: float, meeting: float
         for i in range(kept):
             other = choice.chosen[i]
             apart = gap if found.piece[other] == found.piece[best] else meeting
-            alike = alike or apart2(found, other, best) < apart * apart
+            alike = alike or distance2(found.x[other], found.x[best]) < apart * apart
         if not alike:
             choice.chosen[kept] = best
             kept += 1
@@ -136,20 +145,24 @@ def cheapest(found: Candidates, count: int, choice: Choice) -> int:
 
 
 @njit
+def marked_cost(found: Candidates, count: int, rank: int, choice: Choice) -> float:
+    """The ``rank``-th least cost of the marked candidates, infinite where there are fewer."""
+    least = -1.0
+    for _ in range(rank):
+        next_least = np.inf
+        for c in range(count):
+            if choice.marked[c] and least < found.cost[c] < next_least:
+                next_least = found.cost[c]
+        least = next_least
+    return least
+
+
+@njit
 def marked_like(found: Candidates, count: int, candidate: int, choice: Choice) -> int:
     """A marked candidate of the same piece and finite cost that the candidate is near, -1 for none."""
     for c in range(count):
         if c == candidate or not choice.marked[c] or not found.cost[c] < np.inf:
             continue
-        if found.piece[c] == found.piece[candidate] and apart2(found, c, candidate) < ALIKE * ALIKE:
+        if found.piece[c] == found.piece[candidate] and distance2(found.x[c], found.x[candidate]) < ALIKE * ALIKE:
             return c
     return -1
-
-
-@njit
-def apart2(found: Candidates, c: int, other: int) -> float:
-    """Squared distance of two candidates, rad²."""
-    distance2 = 0.0
-    for j in range(found.x.shape[1]):
-        distance2 += (found.x[c, j] - found.x[other, j]) ** 2
-    return distance2

@@ -16,13 +16,15 @@ from math import sqrt
 import numpy as np
 
 from cdfctl.fields.kernel.body import Body
+from cdfctl.fields.kernel.candidates import Candidates
 from cdfctl.fields.kernel.contact import AT_LIMIT
 from cdfctl.fields.kernel.escape import Escape, escape_from, new_escape
 from cdfctl.fields.kernel.jit import njit
+from cdfctl.fields.kernel.joints import copy
 from cdfctl.fields.kernel.memory import Memory, begin_query
 from cdfctl.fields.kernel.parts import Parts, obstacle_pose, time_derivative
-from cdfctl.fields.kernel.projection import copy
-from cdfctl.fields.kernel.search import Search, nearest_contacts, new_search, pieces_at, place_at
+from cdfctl.fields.kernel.pieces import pieces_at, place_at
+from cdfctl.fields.kernel.search import Search, nearest_contacts, new_search
 from cdfctl.fields.kernel.starts import Table, table_starts
 from cdfctl.fields.kernel.structs import Struct
 from cdfctl.fields.kernel.vec import Vec, add, rotate, vec, vec3
@@ -99,11 +101,12 @@ def contact_rows(
     without a way out, and not valid.
     """
     begin_query(memory, q, parts)
-    found = work.search.found
-    place_at(body, q, work.search)
+    finisher, pieces = work.search.finisher, work.search.pieces
+    found = finisher.found
+    place_at(body, q, finisher.scratch.y, found)
     count = 0
     for o in range(parts.first.shape[0] - 1):
-        nearest = pieces_at(body, q, parts, o, work.search)
+        nearest = pieces_at(body, q, parts, o, found, pieces, finisher.work)
         rows.f[o] = found.f[nearest]
         centre, size = _ball_around(parts, o, vec(found.b, nearest))
         if found.f[nearest] < 0.0:
@@ -111,7 +114,7 @@ def contact_rows(
         else:
             filled = nearest_contacts(body, q, parts, o, memory, table, centre, size, sheets, work.search)
             for i in range(filled):
-                _fill(body, q, parts, o, work.search, work.search.choice.chosen[i], rows, count + i)
+                _fill(body, q, parts, o, found, finisher.choice.chosen[i], rows, count + i)
         if filled == 0 and every_obstacle:
             _say_none(rows, o, count, -np.inf if found.f[nearest] < 0.0 else np.inf)
             filled = 1
@@ -140,9 +143,8 @@ def _ball_around(parts: Parts, o: int, b: Vec) -> tuple[Vec, float]:
 
 
 @njit
-def _fill(body: Body, q: Array, parts: Parts, o: int, search: Search, c: int, rows: ContactRows, i: int) -> None:
+def _fill(body: Body, q: Array, parts: Parts, o: int, found: Candidates, c: int, rows: ContactRows, i: int) -> None:
     """Row i of obstacle o from candidate c, a contact outside penetration."""
-    found = search.found
     x, g = found.x[c], found.g[c]
     lower, upper = body.chain.lower, body.chain.upper
     D2, free2, g2, whole2 = 0.0, 0.0, 0.0, 0.0
@@ -199,7 +201,7 @@ def _escape_row(
             copy(work.search.entries.x[s - 1 - warm], escape.x)
         for j in range(q.shape[0]):
             escape.x[j] = min(max(escape.x[j], body.chain.lower[j]), body.chain.upper[j])
-        D = escape_from(body, q, parts, o, escape, work.search.work)
+        D = escape_from(body, q, parts, o, escape, work.search.finisher.work)
         if best > D:
             best = D
             touching = _fill_escape(body, q, o, D, escape, rows, i)

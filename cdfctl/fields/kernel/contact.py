@@ -6,14 +6,13 @@ with f the signed distance of the piece at configuration x. Far from the surface
 linearised constraint: Newton's restoration. Near it, a step of sequential quadratic programming: with the gradient g of
 f and the multiplier λ (least squares on the free joints)
 
-    min 1/2 dᵀ B d + (x - q)ᵀ d   s.t.   f + gᵀ d = 0,    B = 1 + λ (H + σ Tᵀ T)
+    min 1/2 dᵀ B d + (x - q)ᵀ d   s.t.   f + gᵀ d = 0,    B = 1 + λ H
 
-where H_ij = -ν·(z_i × J_j), i <= j, is the exact second derivative of f for a contact point fixed to the link, T the
-Jacobian of that point within the tangent plane, and σ stands for the curvature of the two surfaces. The kernel does not
-compute that one: σ begins with the curvature of a ball of the two radii, and where a step gained little it follows from
-how the residual changed.
-B decides only how fast the iteration converges, never to what: an identity in its place needs twice the steps and fails
-four times as often.
+where H is the second derivative of f (:mod:`.curvature`). It is exact, and jumps where the nearest points pass from one
+corner, edge or face to the next; between, the iteration converges quadratically: a contact that is followed from one
+query to the next takes one step or two. Where a step went too far, from a face over its edge, it is taken back to where
+the slope along it is zero. Far from convergence H is that of two corners, which bends most: steps are shorter, and do
+not run along a face past the nearest contact.
 """
 
 from __future__ import annotations
@@ -24,41 +23,56 @@ import numpy as np
 
 from cdfctl.fields.kernel.body import Body, forward, forward_to, gradient, piece_pose
 from cdfctl.fields.kernel.candidates import Candidates
-from cdfctl.fields.kernel.distance import NO_CONTACT, Work, block_bound, relative_pose
+from cdfctl.fields.kernel.curvature import curvature
+from cdfctl.fields.kernel.distance import NO_CONTACT, Carrier, Work, block_bound, relative_pose
 from cdfctl.fields.kernel.jit import njit
+from cdfctl.fields.kernel.joints import copy, inner
 from cdfctl.fields.kernel.parts import Parts
-from cdfctl.fields.kernel.projection import copy, project
+from cdfctl.fields.kernel.projection import project
 from cdfctl.fields.kernel.quadratic import Quadratic, new_quadratic, newton_direction
 from cdfctl.fields.kernel.rows import nearest_in_block, nearest_pair
 from cdfctl.fields.kernel.structs import Struct
-from cdfctl.fields.kernel.vec import ZERO, cross, dot, store, sub, vec
+from cdfctl.fields.kernel.vec import ZERO, along, cross, dot, store, sub, vec
 from cdfctl.types import Array
 
 FAR = 0.12  # rad of linearised distance to the surface, above which a step only restores
 LONGEST_RESTORATION = 1.0  # rad
 LONGEST_STEP = 0.35  # rad
-CURVATURE = 20.0  # σ to begin with where the shapes do not tell, 1/m: of a surface of 5 cm radius
-GREATEST_CURVATURE = 60.0  # 1/m
-SLOWLY = 0.2  # share of the residual left by a step that calls for another σ
-LOCAL = 0.2  # rad: the residual below which a secant says something of the curvature at the contact
+ACROSS = 10.0  # added to B along g, where the constraint leaves no choice: B need be positive along the surface only
+SLOWLY = 0.5  # share of the residual left by a step that is looked at again
+OVERSHOT = (
+    0.5  # share of the slope at its beginning that a step shows at its end, with the other sign, if it went too far
+)
+SHORT = 1e-5  # rad, of a projection that is believed
+LOCAL = 0.02  # rad: the residual above which a step takes the greatest curvature there can be
 AT_LIMIT = 1e-6  # rad: a joint nearer than this to a limit is at it
 STILL = 1e-9  # m/rad: no joint moves the contact
 
 
 class Scratch(Struct):
-    """Workspace of a step: ``B`` (n, n), ``J`` (n, 3) columns of the contact point, ``y``, ``z`` (n,), ``normal``."""
+    """Workspace of a step: ``B`` (n, n), ``stiff`` (1,), ``y``, ``z`` (n,), and ``u``, ``slide`` (n, 2), which are u_j
+    and y_j of :mod:`.curvature`."""
 
     B: Array
-    J: Array
+    stiff: Array
+    u: Array
+    slide: Array
     y: Array
     z: Array
-    normal: Array
     quadratic: Quadratic
 
 
 def new_scratch(n: int) -> Scratch:
     """A workspace for ``n`` joints."""
-    return Scratch(np.zeros((n, n)), np.zeros((n, 3)), np.zeros(n), np.zeros(n), np.zeros(3), new_quadratic(n))
+    return Scratch(
+        B=np.zeros((n, n)),
+        stiff=np.zeros(1),
+        u=np.zeros((n, 2)),
+        slide=np.zeros((n, 2)),
+        y=np.zeros(n),
+        z=np.zeros(n),
+        quadratic=new_quadratic(n),
+    )
 
 
 @njit
@@ -78,8 +92,17 @@ def evaluate_placed(body: Body, q: Array, parts: Parts, o: int, found: Candidate
     store(found.a, c, contact.a)
     store(found.b, c, contact.b)
     store(found.normal, c, contact.normal)
+    _keep_corners(found, c, work.carrier)
     gradient(body, found.frames, place, body.joint[k], contact.a, contact.normal, found.g[c])
     measure(body, q, found, c)
+
+
+@njit
+def _keep_corners(found: Candidates, c: int, carrier: Carrier) -> None:
+    found.part[c], found.corners[c] = carrier.part[0], carrier.size[0]
+    for i in range(carrier.size[0]):
+        for j in range(3):
+            found.corner_a[c, i, j], found.corner_b[c, i, j] = carrier.a[i, j], carrier.b[i, j]
 
 
 @njit
@@ -128,12 +151,10 @@ def advance(
             y[j] -= x[j]
         longest = LONGEST_RESTORATION
     else:
-        hessian(body, found, c, scratch)
+        hessian(body, parts, found, c, scratch)
         newton_direction(scratch.B, x, q, found.f[c], g, lower, upper, y, scratch.quadratic)
         longest = LONGEST_STEP
-    length2 = 0.0
-    for j in range(y.shape[0]):
-        length2 += y[j] * y[j]
+    length2 = inner(y, y)
     share = min(1.0, longest / sqrt(length2)) if length2 > 0.0 else 0.0
     for j in range(y.shape[0]):
         moved = x[j] + share * y[j]
@@ -143,72 +164,70 @@ def advance(
             moved = upper[j]
         y[j] = moved - x[j]
         x[j] = moved
-    multiplier, residual = found.multiplier[c], found.residual[c]
-    copy(found.z[c], scratch.z)
+    residual, before = found.residual[c], inner(y, found.z[c])
     evaluate(body, q, parts, o, found, c, work)
-    if near and multiplier > 0.0:
-        if not found.residual[c] < residual:
-            found.curvature[c] = curvature_at(body, parts, o, found.piece[c])
-        elif residual < LOCAL and found.residual[c] > SLOWLY * residual:
-            learn_curvature(found, c, multiplier, scratch)
+    if near and found.residual[c] > SLOWLY * residual:
+        _turn_back(body, q, parts, o, found, c, before, scratch, work)
 
 
 @njit
-def curvature_at(body: Body, parts: Parts, o: int, k: int) -> float:
-    """σ to begin with, 1/m, for piece k and obstacle o.
+def _turn_back(
+    body: Body, q: Array, parts: Parts, o: int, found: Candidates, c: int, before: float, scratch: Scratch, work: Work
+) -> None:
+    """Where the last step of candidate c, ``scratch.y``, went past the least distance along it: back to that place.
 
-    Where a corner of one core touches, the surface around it is a ball of the two radii together, and σ is exactly its
-    curvature. Most contacts are of that kind. Without radii there is nothing to go by.
+    The slope along the step was ``before`` where it began. The least is where the slope is zero, on the secant of the
+    two slopes, or, after a step from a flat face past an edge, on the tangent here, which is steeper.
     """
-    radii: float = body.sets.info[k].radius + parts.sets.info[parts.first[o]].radius
-    return 1.0 / radii if radii * GREATEST_CURVATURE > 1.0 else CURVATURE
+    x, y, g = found.x[c], scratch.y, found.g[c]
+    after = inner(y, found.z[c])
+    if not (before < 0.0 and after > -OVERSHOT * before):
+        return
+    hessian(body, parts, found, c, scratch)
+    bend = -scratch.stiff[0] * inner(g, y) ** 2
+    for j in range(y.shape[0]):
+        bend += y[j] * inner(scratch.B[j], y)
+    back = after / max(bend, after - before)
+    for j in range(y.shape[0]):
+        x[j] -= back * y[j]
+    evaluate(body, q, parts, o, found, c, work)
 
 
 @njit
-def learn_curvature(found: Candidates, c: int, multiplier: float, scratch: Scratch) -> None:
-    """σ from the last step d, ``scratch.y``, by the secant condition dᵀ(1 + λ (H + σ TᵀT)) d = dᵀ(z - z_before)."""
-    d, B, J = scratch.y, scratch.B, scratch.J
-    n = d.shape[0]
-    curved, observed, length2 = 0.0, 0.0, 0.0
-    w0, w1, w2 = 0.0, 0.0, 0.0
-    for i in range(n):
-        length2 += d[i] * d[i]
-        observed += d[i] * (found.z[c, i] - scratch.z[i])
-        w0, w1, w2 = w0 + d[i] * J[i, 0], w1 + d[i] * J[i, 1], w2 + d[i] * J[i, 2]
-        for j in range(n):
-            curved += d[i] * B[i, j] * d[j]
-    normal = scratch.normal
-    along = normal[0] * w0 + normal[1] * w1 + normal[2] * w2
-    tangential = multiplier * (w0 * w0 + w1 * w1 + w2 * w2 - along * along)
-    if tangential > 1e-3 * length2:
-        sigma = found.curvature[c] + (observed - curved) / tangential
-        found.curvature[c] = min(max(sigma, 0.0), GREATEST_CURVATURE)
-
-
-@njit
-def hessian(body: Body, found: Candidates, c: int, scratch: Scratch) -> None:
-    """B of the module's text, for candidate c, and which joints are still."""
+def hessian(body: Body, parts: Parts, found: Candidates, c: int, scratch: Scratch) -> None:
+    """B of the module's text, for candidate c, plus ``scratch.stiff`` g gᵀ, and which joints are still."""
     chain = body.chain
-    joint = body.joint[found.piece[c]]
+    k = found.piece[c]
+    joint = body.joint[k]
     axis, origin = found.frames.axis[found.place[c]], found.frames.translation[found.place[c]]
-    normal, a, g = vec(found.normal, c), vec(found.a, c), found.g[c]
+    normal = vec(found.normal, c)
+    a = along(vec(found.a, c), -body.sets.info[k].radius, normal)
     multiplier = max(0.0, found.multiplier[c])
-    sigma = multiplier * found.curvature[c]
-    B, J = scratch.B, scratch.J
-    for i in range(3):
-        scratch.normal[i] = normal[i]
+    bend = curvature(body, parts, found, c, found.residual[c] > LOCAL)
+    W, N = bend.W, bend.N
+    share = multiplier / bend.D
+    g = found.g[c]
+    stiff = ACROSS / inner(g, g)
+    scratch.stiff[0] = stiff
+    B, u, y = scratch.B, scratch.u, scratch.slide
     for j in range(B.shape[0]):
         scratch.quadratic.still[j] = not chain.moves[j, joint]
         if scratch.quadratic.still[j]:
-            J_j = ZERO
+            J_j, v_s, v_t = ZERO, 0.0, 0.0
         elif chain.prismatic[j]:
-            J_j = vec(axis, j)
+            J_j, v_s, v_t = vec(axis, j), 0.0, 0.0
         else:
-            J_j = cross(vec(axis, j), sub(a, vec(origin, j)))
-        store(J, j, J_j)
+            z = vec(axis, j)
+            turned = cross(z, normal)
+            J_j, v_s, v_t = cross(z, sub(a, vec(origin, j))), bend.D * dot(turned, bend.s), bend.D * dot(turned, bend.t)
         across = cross(J_j, normal)  # ν·(z_i × J_j) = z_i·(J_j × ν)
+        u_s, u_t = dot(J_j, bend.s), dot(J_j, bend.t)
+        w_s, w_t = W[0] * u_s + W[1] * u_t, W[1] * u_s + W[2] * u_t
+        y_s, y_t = w_s + v_s, w_t + v_t
+        n_s, n_t = N[0] * y_s + N[1] * y_t, N[1] * y_s + N[2] * y_t
+        u[j, 0], u[j, 1], y[j, 0], y[j, 1] = u_s, u_t, y_s, y_t
         for i in range(j + 1):
-            value = sigma * (dot(vec(J, i), J_j) - g[i] * g[j])  # g = -νᵀJ
+            value = stiff * g[i] * g[j] + share * (u[i, 0] * w_s + u[i, 1] * w_t - y[i, 0] * n_s - y[i, 1] * n_t)
             if chain.moves[i, j] and not chain.prismatic[i]:
                 value -= multiplier * dot(vec(axis, i), across)
             B[i, j] = value
@@ -220,7 +239,10 @@ def hessian(body: Body, found: Candidates, c: int, scratch: Scratch) -> None:
 def restore(
     body: Body, q: Array, parts: Parts, o: int, found: Candidates, c: int, scratch: Scratch, work: Work
 ) -> None:
-    """Bring candidate c onto the surface: up to four projections, until |f| is under 1e-9 m. Joints at limits stay."""
+    """Bring candidate c onto the surface: up to four projections, until |f| is under 1e-9 m. Joints at limits stay.
+
+    What a projection of less than :data:`SHORT` leaves is not measured: it is the square of that, times the curvature.
+    """
     lower, upper = body.chain.lower, body.chain.upper
     x, y, g = found.x[c], scratch.y, scratch.z
     for _ in range(4):
@@ -230,7 +252,11 @@ def restore(
             free = lower[j] + AT_LIMIT < x[j] < upper[j] - AT_LIMIT
             g[j] = found.g[c, j] if free else 0.0
         project(x, x, found.f[c], g, lower, upper, y)
+        short = abs(found.f[c]) < SHORT * found.slope[c]
         copy(y, x)
+        if short:
+            found.f[c] = 0.0
+            return
         evaluate(body, q, parts, o, found, c, work)
 
 

@@ -37,16 +37,29 @@ from cdfctl.fields.kernel.vec import (
     transpose,
     vec3,
 )
+from cdfctl.types import Array, IntArray
+
+
+class Carrier(Struct):
+    """The corners of two cores that carry their nearest points: ``a``, ``b`` (4, 3) in the frame of the first core, how
+    many there are, ``size`` (1,), 0 for cores that touch; and the ``part`` (1,) of the obstacles."""
+
+    a: Array
+    b: Array
+    size: IntArray
+    part: IntArray
 
 
 class Work(Struct):
     """Workspace of the distance functions: one for each thread, nothing is kept between calls.
 
+    ``carrier`` is of the nearest pair that was measured last (see :func:`cdfctl.fields.kernel.rows.nearest_pair`).
     ``measure`` is :func:`_measure`, whose code is long and its callers many.
     """
 
     simplex: Simplex
     polytope: Polytope
+    carrier: Carrier
     measure: Callable[[ConvexSets, int, ConvexSets, int, Rot, Vec, Vec, float, Simplex, Polytope], Contact]
 
 
@@ -106,7 +119,7 @@ def _measure(
     core_cutoff = max(0.0, cutoff + r_a + r_b)
     core = core_distance(sets_a, i, sets_b, j, r, t, guess, core_cutoff, simplex)
     if core.touching:
-        return _touching(sets_a, i, sets_b, j, r, t, core.a, core.v, polytope)
+        return _touching(sets_a, i, sets_b, j, r, t, core.a, core.v, simplex, polytope)
     normal = scale(-1.0 / norm(core.v), core.v)
     d = core.distance - r_a - r_b
     return Contact(d, along(core.a, r_a, normal), along(core.b, -r_b, normal), normal)
@@ -114,16 +127,36 @@ def _measure(
 
 @njit
 def _touching(
-    sets_a: ConvexSets, i: int, sets_b: ConvexSets, j: int, r: Rot, t: Vec, shared: Vec, v: Vec, polytope: Polytope
+    sets_a: ConvexSets,
+    i: int,
+    sets_b: ConvexSets,
+    j: int,
+    r: Rot,
+    t: Vec,
+    shared: Vec,
+    v: Vec,
+    simplex: Simplex,
+    polytope: Polytope,
 ) -> Contact:
     """The contact of cores that touch (their nearest points ``v`` apart, or less than rounding) or overlap."""
     r_a, r_b = sets_a.info[i].radius, sets_b.info[j].radius
-    core = core_depth(sets_a, i, sets_b, j, r, t, polytope)
+    core = core_depth(sets_a, i, sets_b, j, r, t, simplex, polytope)
     a, depth, normal = core.a, core.depth, core.normal
     if core.flat:
         a, depth = shared, 0.0
     d = -depth - r_a - r_b
     return Contact(d, along(a, r_a, normal), along(a, r_a + d, normal), normal)
+
+
+@njit
+def keep_carrier(work: Work, p: int) -> None:
+    """Keep what carries the nearest points of the pair measured last, the obstacles' part p in it."""
+    simplex, carrier = work.simplex, work.carrier
+    carrier.size[0], carrier.part[0] = simplex.size[0], p
+    for i in range(simplex.size[0]):
+        for k in range(3):
+            carrier.a[i, k] = simplex.a[i, k]
+            carrier.b[i, k] = simplex.a[i, k] - simplex.w[i, k]
 
 
 @njit
@@ -184,7 +217,8 @@ def new_work() -> Work:
     """A workspace; about 150 kB."""
     sets, simplex, polytope = pack([]), new_simplex(), new_polytope()
     measure = compiled(_measure, sets, 0, sets, 0, (ZERO, ZERO, ZERO), ZERO, ZERO, 0.0, simplex, polytope)
-    return Work(simplex, polytope, measure)
+    carrier = Carrier(np.zeros((4, 3)), np.zeros((4, 3)), np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))
+    return Work(simplex, polytope, carrier, measure)
 
 
 NO_CONTACT = Contact(np.inf, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cdfctl.fields.kernel.gjk import support_of_difference
+from cdfctl.fields.kernel.gjk import Simplex, store_vertex, support_of_difference
 from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.sets import ConvexSets
 from cdfctl.fields.kernel.structs import Struct
@@ -67,8 +67,14 @@ class CoreDepth(NamedTuple):
 
 
 @njit
-def core_depth(sets_a: ConvexSets, i: int, sets_b: ConvexSets, j: int, r: Rot, t: Vec, polytope: Polytope) -> CoreDepth:
-    """Penetration depth of core i of A and core j of B, whose frame is (r, t) in that of A."""
+def core_depth(
+    sets_a: ConvexSets, i: int, sets_b: ConvexSets, j: int, r: Rot, t: Vec, simplex: Simplex, polytope: Polytope
+) -> CoreDepth:
+    """Penetration depth of core i of A and core j of B, whose frame is (r, t) in that of A.
+
+    ``simplex`` becomes the face of D that is nearest to the origin; it has no points where D is flat.
+    """
+    simplex.size[0] = 0
     size = sets_a.info[i].reach + sets_b.info[j].reach
     flat, flat_normal = _start(sets_a, i, sets_b, j, r, t, FLAT * size, polytope)
     if flat:
@@ -98,7 +104,12 @@ def core_depth(sets_a: ConvexSets, i: int, sets_b: ConvexSets, j: int, r: Rot, t
                     if dot(n, w) < depth:
                         depth, normal, nearest = dot(n, w), n, f
             break
-    return CoreDepth(depth, normal, _witness(polytope, faces, nearest, 10.0 * COPLANAR * size), False)
+    face = _face_of_foot(polytope, faces, nearest, 10.0 * COPLANAR * size)
+    simplex.size[0] = 3
+    for k in range(3):
+        v = polytope.face[face, k]
+        store_vertex(simplex, k, vec(polytope.w, v), vec(polytope.a, v))
+    return CoreDepth(depth, normal, _witness(polytope, face), False)
 
 
 @njit
@@ -250,8 +261,8 @@ def _toggle(edge: IntArray, rim: int, i: int, j: int) -> int:
 
 
 @njit
-def _witness(polytope: Polytope, faces: int, nearest: int, tolerance: float) -> Vec:
-    """The point of A behind the foot of the origin on the nearest face.
+def _face_of_foot(polytope: Polytope, faces: int, nearest: int, tolerance: float) -> int:
+    """The face in the plane of the ``nearest`` one in which the foot of the origin lies.
 
     Faces in one plane share an offset and the foot lies in one of them only: the one whose least barycentric coordinate
     is greatest.
@@ -263,8 +274,14 @@ def _witness(polytope: Polytope, faces: int, nearest: int, tolerance: float) -> 
             least = min(*_foot(polytope, f))
             if least > inside:
                 best, inside = f, least
-    alpha, beta, gamma = _foot(polytope, best)
-    i, j, k = polytope.face[best, 0], polytope.face[best, 1], polytope.face[best, 2]
+    return best
+
+
+@njit
+def _witness(polytope: Polytope, face: int) -> Vec:
+    """The point of A behind the foot of the origin on a face."""
+    alpha, beta, gamma = _foot(polytope, face)
+    i, j, k = polytope.face[face, 0], polytope.face[face, 1], polytope.face[face, 2]
     a = polytope.a
     return (
         alpha * a[i, 0] + beta * a[j, 0] + gamma * a[k, 0],

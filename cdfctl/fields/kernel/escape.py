@@ -20,6 +20,7 @@ import numpy as np
 from cdfctl.fields.kernel.body import Body, Frames, forward, gradient, new_frames
 from cdfctl.fields.kernel.distance import Work
 from cdfctl.fields.kernel.jit import njit
+from cdfctl.fields.kernel.joints import distance2
 from cdfctl.fields.kernel.parts import Parts, time_derivative
 from cdfctl.fields.kernel.projection import project
 from cdfctl.fields.kernel.rows import nearest_pair
@@ -65,9 +66,7 @@ def escape_from(body: Body, q: Array, parts: Parts, o: int, escape: Escape, work
     for _ in range(STEPS):
         least = linearise(body, parts, o, escape, work)
         _project_all(q, lower, upper, escape)
-        step2 = 0.0
-        for j in range(n):
-            step2 += (y[j] - x[j]) ** 2
+        step2 = distance2(y, x)
         if step2 <= SETTLED * SETTLED and least >= -TOUCH:
             break
         share = min(1.0, LONGEST_STEP / sqrt(step2)) if step2 > 0.0 else 0.0
@@ -76,10 +75,7 @@ def escape_from(body: Body, q: Array, parts: Parts, o: int, escape: Escape, work
     least = linearise(body, parts, o, escape, work)
     if not abs(least) <= TOUCH:
         return np.inf
-    distance2 = 0.0
-    for j in range(n):
-        distance2 += (x[j] - q[j]) ** 2
-    return sqrt(distance2)
+    return sqrt(distance2(x, q))
 
 
 @njit

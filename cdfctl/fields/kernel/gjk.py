@@ -21,7 +21,7 @@ from cdfctl.fields.kernel.sets import ConvexSets, support
 from cdfctl.fields.kernel.simplex import nearest_on_segment, nearest_on_tetrahedron, nearest_on_triangle
 from cdfctl.fields.kernel.structs import Struct
 from cdfctl.fields.kernel.vec import ZERO, Rot, Vec, add, along, dot, rotate, rotate_back, scale, sub
-from cdfctl.types import Array
+from cdfctl.types import Array, IntArray
 
 MAX_STEPS = 128  # polytopes need about ten; cylinders, whose edge is curved, up to about fifty
 GAP = 1e-15  # relative gap of the bounds, and the rounding of a coordinate of size one
@@ -29,10 +29,11 @@ TOUCH = 1e-10  # cores nearer than this, relative to their size, count as touchi
 
 
 class Simplex(Struct):
-    """Workspace of GJK: the points of D, and the points of A they come from. (4, 3) each."""
+    """Workspace of GJK: the points of D, and the points of A they come from, (4, 3) each; how many there are, (1,)."""
 
     w: Array
     a: Array
+    size: IntArray
 
 
 class CoreDistance(NamedTuple):
@@ -72,7 +73,7 @@ def core_distance(
     """
     v = scale(-1.0, guess)
     a, w = support_of_difference(sets_a, i, sets_b, j, r, t, guess)
-    v, size = w, 1
+    v, size, simplex.size[0] = w, 1, 1
     store_vertex(simplex, 0, w, a)
     best_a, best_vv = a, dot(w, w)
     reach = sets_a.info[i].reach + sets_b.info[j].reach
@@ -88,6 +89,7 @@ def core_distance(
             break
         store_vertex(simplex, size, w, a)
         size, nearest, nearest_a = reduce(simplex, size + 1)
+        simplex.size[0] = size
         if size == 4:
             return CoreDistance(0.0, nearest_a, nearest_a, ZERO, True, False)
         nearest2 = dot(nearest, nearest)
@@ -148,4 +150,4 @@ def reduce(simplex: Simplex, size: int) -> tuple[int, Vec, Vec]:
 
 def new_simplex() -> Simplex:
     """An empty workspace."""
-    return Simplex(np.zeros((4, 3)), np.zeros((4, 3)))
+    return Simplex(np.zeros((4, 3)), np.zeros((4, 3)), np.zeros(1, dtype=np.int64))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from operator import is_
 
 import numpy as np
@@ -72,9 +73,9 @@ class SceneParts:
         self._shapes = scene.shapes
         parts = self._parts
         parts.pose[:], parts.twist[:] = scene.poses, scene.twists
-        if not (np.isfinite(parts.pose).all() and np.isfinite(parts.twist).all()):
-            raise InputError("the poses and twists of the obstacles must be finite")
         turn_obstacles(parts.pose, parts.rotation)
+        if not (all_finite(parts.pose) and all_finite(parts.twist)):
+            raise InputError("the poses and twists of the obstacles must be finite")
         return parts
 
 
@@ -140,6 +141,16 @@ def turn_obstacles(pose: Array, rotation: Array) -> None:
             (s * (x * z - y * w), s * (y * z + x * w), 1.0 - s * (x * x + y * y)),
         )
         store_rot(rotation, o, r)
+
+
+@njit
+def all_finite(numbers: Array) -> bool:
+    """Whether no number of a (k, l) array is infinite or NaN."""
+    for i in range(numbers.shape[0]):
+        for j in range(numbers.shape[1]):
+            if not isfinite(numbers[i, j]):
+                return False
+    return True
 
 
 @njit

@@ -70,10 +70,3 @@ def _next_free(target: Array, g: Array, lower: Array, upper: Array, multiplier: 
         if excess < 0.0 and enter < multiplier:
             best = max(best, min(leave, multiplier) - 1e-9 * (min(leave, multiplier) - enter))
     return best
-
-
-@njit
-def copy(source: Array, target: Array) -> None:
-    """``target`` (n,) becomes ``source``; a slice assignment would allocate."""
-    for j in range(source.shape[0]):
-        target[j] = source[j]

@@ -12,6 +12,7 @@ from cdfctl.fields.kernel.distance import (
     Contact,
     Work,
     block_bound,
+    keep_carrier,
     lower_bound,
     relative_pose,
     signed_distance,
@@ -122,6 +123,7 @@ def nearest_in_block(
             contact = signed_distance(body.sets, k, parts.sets, p, r, t, ZERO, best.d, work)
             if contact.d < best.d or best_k < 0:
                 best_k, best = k, to_world(r_a, t_a, contact)
+                keep_carrier(work, p)
     return best_k, best
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from cdfctl.fields.kernel.body import Body, Frames, forward, new_frames, piece_pose
 from cdfctl.fields.kernel.distance import gap_to_ball
 from cdfctl.fields.kernel.jit import njit
-from cdfctl.fields.kernel.projection import copy
+from cdfctl.fields.kernel.joints import copy, distance2
 from cdfctl.fields.kernel.structs import Struct
 from cdfctl.fields.kernel.vec import (
     Vec,
@@ -198,15 +198,11 @@ def keep_offer(starts: Starts, count: int, piece: int, cost: float) -> int:
     """
     place = min(count, starts.cost.shape[0] - 1)  # the one that gives way
     for i in range(count):
-        if starts.piece[i] == piece:
-            distance2 = 0.0
-            for j in range(starts.offer.shape[0]):
-                distance2 += (starts.x[i, j] - starts.offer[j]) ** 2
-            if distance2 < SPACING * SPACING:
-                if starts.cost[i] <= cost:
-                    return count
-                place = i
-                break
+        if starts.piece[i] == piece and distance2(starts.x[i], starts.offer) < SPACING * SPACING:
+            if starts.cost[i] <= cost:
+                return count
+            place = i
+            break
     grown: int = max(count, place + 1)
     while place > 0 and starts.cost[place - 1] > cost:
         starts.cost[place], starts.piece[place] = starts.cost[place - 1], starts.piece[place - 1]
@@ -285,14 +281,14 @@ def _point_starts(body: Body, q: Array, table: Table, x: int, y: int, z: int, st
     n = q.shape[0]
     for e in range(table.first[index], table.first[index + 1]):
         joint = body.joint[table.piece[e]]
-        distance2 = 0.0
+        moved2 = 0.0
         for j in range(n):
             if chain.moves[j, joint]:
-                distance2 += (_turned(body, table.q[e, j], j, q) - q[j]) ** 2
-        if wanted(starts, count, sqrt(distance2)):
+                moved2 += (_turned(body, table.q[e, j], j, q) - q[j]) ** 2
+        if wanted(starts, count, sqrt(moved2)):
             for j in range(n):
                 starts.offer[j] = _turned(body, table.q[e, j], j, q) if chain.moves[j, joint] else q[j]
-            count = keep_offer(starts, count, table.piece[e], sqrt(distance2))
+            count = keep_offer(starts, count, table.piece[e], sqrt(moved2))
     return count
 
 

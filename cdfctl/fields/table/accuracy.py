@@ -221,7 +221,7 @@ class HeldOut:
             return None
         for _ in range(100):
             q = random.uniform(lower, upper)
-            cold, clear = self._query(q, point, self._nothing, new_memory(1, 3, self._n))
+            cold, clear = self._query(q, point, self._nothing, self._memory())
             if clear:
                 break
         else:
@@ -230,7 +230,7 @@ class HeldOut:
         drift *= BALL_SPEED / float(np.linalg.norm(drift))
         warm = []
         for of in (self._nothing, table):
-            memory = new_memory(1, 3, self._n)
+            memory = self._memory()
             for step in range(LOOP, -1, -1):
                 back = np.clip(q - step * PERIOD * towards, lower, upper)
                 last, _ = self._query(back, point - step * PERIOD * drift, of, memory)
@@ -238,7 +238,7 @@ class HeldOut:
         ways = (
             self._table_alone(q, point),
             cold,
-            self._query(q, point, table, new_memory(1, 3, self._n))[0],
+            self._query(q, point, table, self._memory())[0],
             *warm,
         )
         truth = min(*ways[1:], self._truth(q, point, fresh))
@@ -250,6 +250,9 @@ class HeldOut:
         self._parts.pose[0, :3] = point
         contact_rows(self._body, q, self._parts, memory, table, 1, False, rows, self._work)
         return (float(rows.d[0]) if rows.count[0] else np.inf), bool(rows.f[0] > 0.0)
+
+    def _memory(self) -> Memory:
+        return new_memory(1, 3, self._n, len(self._body.joint))
 
     def _table_alone(self, q: Array, point: Array) -> float:
         count = table_starts(self._body, q, self._table, tuple(point), self._nearest)
@@ -271,7 +274,7 @@ class HeldOut:
         best = np.inf
         for share in range(SHARES):
             some = _one_point(point, fresh.piece[share::SHARES].copy(), fresh.q[share::SHARES].copy())
-            best = min(best, self._query(q, point, some, new_memory(1, 3, self._n))[0])
+            best = min(best, self._query(q, point, some, self._memory())[0])
         return best
 
 

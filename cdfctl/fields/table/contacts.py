@@ -16,8 +16,9 @@ from cdfctl.fields.kernel.candidates import Candidates, new_candidates
 from cdfctl.fields.kernel.contact import STILL, evaluate, penetrating_piece
 from cdfctl.fields.kernel.distance import Work, new_work
 from cdfctl.fields.kernel.jit import njit
+from cdfctl.fields.kernel.joints import copy
 from cdfctl.fields.kernel.parts import Parts, parts_of
-from cdfctl.fields.kernel.projection import copy, project
+from cdfctl.fields.kernel.projection import project
 from cdfctl.fields.kernel.structs import Struct
 from cdfctl.types import Array, IntArray, Sphere
 
