@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from math import isfinite
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -44,7 +45,8 @@ def as_vector(value: ArrayLike, size: int | None, name: str) -> Array:
 
 def check_finite(array: Array, name: str) -> None:
     """Raise :class:`InputError` where a number of ``array`` is NaN or infinite."""
-    if not np.isfinite(array).all():
+    # One number tells in most cases, in a fifth of the time: a NaN or an infinity in a vector is one in its square.
+    if not isfinite(np.vdot(array, array)) and not np.isfinite(array).all():
         raise InputError(f"{name} must be finite, found {array.tolist()}")
 
 
@@ -305,14 +307,12 @@ class Rows:
         rhs: (k,).
         soft: (k,) True where ``on_infeasible: least-violation`` may relax the row.
         delta: (k,) coefficient of the Lyapunov slack, 0 for every row but a control-Lyapunov row.
-        names: (k,) what each row is, for reports.
     """
 
     G: Array
     rhs: Array
     soft: BoolArray
     delta: Array
-    names: tuple[str, ...]
 
 
 DecisionStatus = Literal["optimal", "least-violation", "brake", "infeasible"]

@@ -109,8 +109,11 @@ class Core:
             InputError: a pose or velocity of ``scene`` is not finite.
         """
         p = self.parameters
-        check_scene(scene)
-        answers = [source.ask(q, scene) for source in self._sources]
+        try:
+            answers = [source.ask(q, scene) for source in self._sources]
+        except InputError:
+            check_scene(scene)  # which says more than a field, that does not know the obstacles' names
+            raise
         parts = [source.rows(a) for source, a in zip(self._sources, answers, strict=True)]
         if task is not None:
             parts.append(task)
@@ -194,7 +197,10 @@ class Core:
 
     def _bounds(self, u: Array, u_ref: Array, low: Array, high: Array) -> Iterable[str]:
         """The joints whose bounds keep ``u`` from ``u_ref``, in words."""
-        names, held = self.robot.joint_names, []
+        held: list[str] = []
+        if not np.count_nonzero(u != u_ref):
+            return held
+        names = self.robot.joint_names
         for name, v, v_ref, least, most in zip(names, *map(Array.tolist, (u, u_ref, low, high)), strict=True):
             if (v_ref < v <= least + TOLERANCE) or (v_ref > v >= most - TOLERANCE):
                 held.append(f"bound of {name}")

@@ -162,9 +162,9 @@ class StepQP:
         alive = ~rows.soft | (norm >= FLAT)
         scale = np.where(rows.soft & alive, 1.0 / np.maximum(norm, FLAT), 1.0)[alive]
         G, rhs = rows.G[alive] * scale[:, None], rows.rhs[alive] * scale
-        scaled = Rows(G, rhs, rows.soft[alive], rows.delta[alive] * scale, ())
+        scaled = Rows(G, rhs, rows.soft[alive], rows.delta[alive] * scale)
         linear = _hopeless(scaled, low, high) & scaled.soft
-        rest = Rows(G[~linear], rhs[~linear], scaled.soft[~linear], scaled.delta[~linear], ())
+        rest = Rows(G[~linear], rhs[~linear], scaled.soft[~linear], scaled.delta[~linear])
         towards = pull - self._rho * G[linear].sum(axis=0)
 
         def under(needed: IntArray) -> Array | None:

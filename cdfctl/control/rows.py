@@ -8,9 +8,11 @@ where it is ``valid`` and its distance finite: an obstacle out of reach constrai
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 
 import numpy as np
 
+from cdfctl.fields.kernel.jit import njit
 from cdfctl.types import Array, BoolArray, FieldQuery, Rows, SelfQuery
 
 
@@ -32,9 +34,7 @@ def tvcbf_rows(query: FieldQuery, alpha: float, margin: float) -> Rows:
 
     Source: the paper's TVCBF condition for the single integrator.
     """
-    d, dq, dt = _used(query)
-    h = d - margin
-    return _soft_rows("tvcbf", -dq, alpha * h + dt)
+    return _barrier_rows(query, alpha, margin, 1.0)
 
 
 def cbf_rows(query: FieldQuery, alpha: float, margin: float) -> Rows:
@@ -44,9 +44,7 @@ def cbf_rows(query: FieldQuery, alpha: float, margin: float) -> Rows:
 
     Args as in :func:`tvcbf_rows`.
     """
-    d, dq, _ = _used(query)
-    h = d - margin
-    return _soft_rows("cbf", -dq, alpha * h)
+    return _barrier_rows(query, alpha, margin, 0.0)
 
 
 def hyperplane_rows(query: FieldQuery, offset: float, dt: float) -> Rows:
@@ -64,11 +62,11 @@ def hyperplane_rows(query: FieldQuery, offset: float, dt: float) -> Rows:
 
     Source: the paper's separating-hyperplane baseline.
     """
-    d, dq, _ = _used(query)
-    argument = d + offset
+    mask = usable(query)
+    argument = query.d[mask] + offset
     logarithm = np.full(argument.shape, -np.inf)
     np.log(argument, out=logarithm, where=argument > 0.0)
-    return _soft_rows("hyperplane", -dq * dt, logarithm)
+    return _soft_rows(-query.dq[mask] * dt, logarithm)
 
 
 def self_collision_rows(query: SelfQuery, alpha: float, margin: float) -> Rows:
@@ -84,7 +82,7 @@ def self_collision_rows(query: SelfQuery, alpha: float, margin: float) -> Rows:
         margin: least distance asked for, m.
     """
     k = query.valid
-    return _soft_rows("self-collision", -query.dq[k], alpha * (query.d[k] - margin))
+    return _soft_rows(-query.dq[k], alpha * (query.d[k] - margin))
 
 
 def tvclf_row(now: float, ahead: FieldQuery, gamma: float, dt: float) -> Rows:
@@ -117,7 +115,6 @@ def tvclf_row(now: float, ahead: FieldQuery, gamma: float, dt: float) -> Rows:
         rhs=-gamma * V - (V_next - V) / dt,
         soft=np.zeros(count, dtype=np.bool_),
         delta=np.ones(count),
-        names=("tvclf",) * count,
     )
 
 
@@ -137,9 +134,18 @@ def joint_limit_box(
         slowest, fastest: v_min <= 0 and v_max >= 0 (n,), rad/s: the robot's at this configuration.
         alpha: alpha_lim, 1/s.
     """
-    low = np.minimum(np.maximum(-alpha * (q - lower), slowest), fastest)
-    high = np.maximum(np.minimum(alpha * (upper - q), fastest), slowest)
+    low, high = np.empty_like(q), np.empty_like(q)
+    _fill_box(q, lower, upper, slowest, fastest, alpha, low, high)
     return low, high
+
+
+@njit
+def _fill_box(
+    q: Array, lower: Array, upper: Array, slowest: Array, fastest: Array, alpha: float, low: Array, high: Array
+) -> None:
+    for j in range(q.shape[0]):
+        low[j] = min(max(-alpha * (q[j] - lower[j]), slowest[j]), fastest[j])
+        high[j] = max(min(alpha * (upper[j] - q[j]), fastest[j]), slowest[j])
 
 
 def acceleration_box(
@@ -191,24 +197,36 @@ def stack(parts: Sequence[Rows], n: int) -> Rows:
     if len(parts) == 1:
         return parts[0]
     if not parts:
-        return Rows(np.zeros((0, n)), np.zeros(0), np.zeros(0, dtype=np.bool_), np.zeros(0), ())
+        return Rows(np.zeros((0, n)), np.zeros(0), np.zeros(0, dtype=np.bool_), np.zeros(0))
     return Rows(
         G=np.concatenate([p.G for p in parts]),
         rhs=np.concatenate([p.rhs for p in parts]),
         soft=np.concatenate([p.soft for p in parts]),
         delta=np.concatenate([p.delta for p in parts]),
-        names=sum((p.names for p in parts), ()),
     )
 
 
-def _used(query: FieldQuery) -> tuple[Array, Array, Array]:
-    """Distance and derivatives, (k,), (k, n), (k,), of the usable rows; no copies where all are."""
-    mask = usable(query)
-    if np.count_nonzero(mask) == len(mask):
-        return query.d, query.dq, query.dt
-    return query.d[mask], query.dq.compress(mask, axis=0), query.dt[mask]
+def _barrier_rows(query: FieldQuery, alpha: float, margin: float, motion: float) -> Rows:
+    """Rows -grad h . u <= alpha h + motion dh/dt of those that are :func:`usable`."""
+    G, rhs = np.empty_like(query.dq), np.empty_like(query.d)
+    k = _fill_barriers(query.d, query.dq, query.dt, query.valid, alpha, margin, motion, G, rhs)
+    return _soft_rows(G[:k], rhs[:k])
 
 
-def _soft_rows(name: str, G: Array, rhs: Array) -> Rows:
+@njit
+def _fill_barriers(
+    d: Array, dq: Array, dt: Array, valid: BoolArray, alpha: float, margin: float, motion: float, G: Array, rhs: Array
+) -> int:
+    k = 0
+    for row in range(d.shape[0]):
+        if valid[row] and isfinite(d[row]):
+            rhs[k] = alpha * (d[row] - margin) + motion * dt[row]
+            for j in range(dq.shape[1]):
+                G[k, j] = -dq[row, j]
+            k += 1
+    return k
+
+
+def _soft_rows(G: Array, rhs: Array) -> Rows:
     k = rhs.shape[0]
-    return Rows(G=G, rhs=rhs, soft=np.ones(k, dtype=np.bool_), delta=np.zeros(k), names=(name,) * k)
+    return Rows(G=G, rhs=rhs, soft=np.ones(k, dtype=np.bool_), delta=np.zeros(k))

@@ -20,7 +20,7 @@ from cdfctl.fields.kernel.distance import Work, new_work
 from cdfctl.fields.kernel.parts import SceneParts
 from cdfctl.fields.kernel.rows import Answer, link_rows, nearest_rows, new_answer
 from cdfctl.robots.robot import Robot
-from cdfctl.types import FieldQuery, IntArray, Scene, Unit, as_vector
+from cdfctl.types import Array, FieldQuery, IntArray, Scene, Unit, as_vector
 
 
 class SDF:
@@ -33,7 +33,7 @@ class SDF:
         self._body = body_of(robot)
         self._frames = new_frames(self._body)
         self._parts = SceneParts()
-        self._answer = new_answer(0, robot.n)
+        self._answer, self._nowhere = new_answer(0, robot.n), _nowhere(0, robot.n)
 
     @cached_property
     def _work(self) -> Work:
@@ -52,7 +52,7 @@ class SDF:
         point, parts = as_vector(q, self.robot.n, "q"), self._parts.of(scene)
         answer = self._room(len(scene))
         nearest_rows(self._body, point, parts, self._frames, self._work, answer)
-        return _rows(answer, np.arange(len(scene), dtype=np.int64))
+        return _rows(answer, np.arange(len(scene), dtype=np.int64), self._nowhere)
 
     def per_link(self, q: ArrayLike, scene: Scene) -> FieldQuery:
         """One row for every obstacle and link: all links of the first obstacle, in the robot's order, then the next.
@@ -64,7 +64,7 @@ class SDF:
         links = len(self.robot.links)
         answer = self._room(len(scene) * links)
         link_rows(self._body, point, parts, self._frames, self._work, answer)
-        return _rows(answer, np.repeat(np.arange(len(scene), dtype=np.int64), links))
+        return _rows(answer, np.arange(len(scene) * links, dtype=np.int64) // links, self._nowhere)
 
     def contacts(self, q: ArrayLike, scene: Scene, *, sheets: int = 1) -> FieldQuery:
         """The same as :meth:`per_link`: a link's signed distance has one contact, whatever ``sheets`` allows."""
@@ -75,11 +75,18 @@ class SDF:
 
     def _room(self, r: int) -> Answer:
         if len(self._answer.d) != r:
-            self._answer = new_answer(r, self.robot.n)
+            self._answer, self._nowhere = new_answer(r, self.robot.n), _nowhere(r, self.robot.n)
         return self._answer
 
 
-def _rows(answer: Answer, obstacle: IntArray) -> FieldQuery:
+def _nowhere(r: int, n: int) -> Array:
+    """The contact configurations (r, n) of a field that knows none; many answers share them, so none can be written."""
+    contact_q = np.full((r, n), np.nan)
+    contact_q.flags.writeable = False
+    return contact_q
+
+
+def _rows(answer: Answer, obstacle: IntArray, contact_q: Array) -> FieldQuery:
     return FieldQuery(
         obstacle=obstacle,
         link=answer.link.copy(),
@@ -87,6 +94,6 @@ def _rows(answer: Answer, obstacle: IntArray) -> FieldQuery:
         dq=answer.dq.copy(),
         dt=answer.dt.copy(),
         valid=answer.valid.copy(),
-        contact_q=np.full(answer.dq.shape, np.nan),
+        contact_q=contact_q,
         unit="m",
     )

@@ -28,7 +28,7 @@ def rows_of(rng: np.random.Generator, k: int, n: int, lyapunov: bool) -> Rows:
     rhs = np.abs(G).sum(axis=1) * rng.uniform(-0.1, 1.5, k)
     delta = np.zeros(k)
     delta[k - lyapunov :] = 1.0
-    return Rows(G, rhs, delta == 0.0, delta, ("row",) * k)
+    return Rows(G, rhs, delta == 0.0, delta)
 
 
 def optimum(P: Array, q: Array, G: Array, h: Array, lb: Array, ub: Array) -> Array | None:
@@ -97,7 +97,7 @@ def test_least_violation_is_the_optimum_of_all_rows(seed: int, n: int, k: int) -
 def test_no_solver_is_asked_where_the_box_alone_decides(monkeypatch: pytest.MonkeyPatch) -> None:
     """u_ref within the rows, or clipped to them: the answer is the clipped reference, to the last bit."""
     monkeypatch.setattr(step, "solve", None)
-    rows = Rows(np.ones((1, 2)), np.array([0.5]), np.ones(1, bool), np.zeros(1), ("row",))
+    rows = Rows(np.ones((1, 2)), np.array([0.5]), np.ones(1, bool), np.zeros(1))
     command = StepQP(2).solve(np.array([5.0, -0.25]), np.zeros(2), rows, np.full(2, -0.5), np.full(2, 0.5))
     assert command.u.tolist() == [0.5, -0.25]
     assert (command.status, command.residual, command.tight.tolist()) == ("optimal", 0.0, [])

@@ -16,11 +16,11 @@ from cdfctl.types import Array, Rows
 
 def soft_rows(G: Array, rhs: Array) -> Rows:
     k = len(rhs)
-    return Rows(np.asarray(G, float), np.asarray(rhs, float), np.ones(k, bool), np.zeros(k), ("row",) * k)
+    return Rows(np.asarray(G, float), np.asarray(rhs, float), np.ones(k, bool), np.zeros(k))
 
 
 def clf_row(g: Array, rhs: float) -> Rows:
-    return Rows(np.asarray(g, float)[None], np.array([rhs]), np.zeros(1, bool), np.ones(1), ("clf",))
+    return Rows(np.asarray(g, float)[None], np.array([rhs]), np.zeros(1, bool), np.ones(1))
 
 
 def feasible(G: Array, rhs: Array, low: Array, high: Array) -> float:
@@ -135,7 +135,6 @@ def test_lyapunov_row_is_not_relaxed_by_least_violation() -> None:
         rhs=np.array([-1.0, -1.0, -0.5]),
         soft=np.array([True, True, False]),
         delta=np.array([0.0, 0.0, 1.0]),
-        names=("a", "b", "clf"),
     )
     command = StepQP(1, slack_weight=100.0).solve(np.zeros(1), np.zeros(1), rows, -5.0 * np.ones(1), 5.0 * np.ones(1))
     assert command.status == "least-violation"

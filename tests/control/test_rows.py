@@ -65,7 +65,6 @@ def test_tvcbf_symbol_by_symbol() -> None:
     assert rows.rhs == pytest.approx([alpha * h + V * (C - L * np.sin(q)) / far])
     assert rows.soft.tolist() == [True]
     assert rows.delta.tolist() == [0.0]
-    assert rows.names == ("tvcbf",)
 
 
 def test_tvcbf_on_its_boundary_makes_the_barrier_decay_at_alpha() -> None:
@@ -87,7 +86,6 @@ def test_cbf_is_tvcbf_of_a_frozen_scene() -> None:
     with_time, without = tvcbf_rows(frozen, 1.5, 0.05), cbf_rows(query, 1.5, 0.05)
     assert without.G.tolist() == with_time.G.tolist()
     assert without.rhs.tolist() == with_time.rhs.tolist()
-    assert without.names == ("cbf",)
 
 
 def test_hyperplane_symbol_by_symbol() -> None:
@@ -115,7 +113,6 @@ def test_tvclf_symbol_by_symbol() -> None:
     assert rows.rhs == pytest.approx([-gamma * now - (then - now) / dt])
     assert rows.delta.tolist() == [1.0]
     assert rows.soft.tolist() == [False]
-    assert rows.names == ("tvclf",)
 
 
 def test_tvclf_out_of_reach_gives_no_row_or_none_of_time() -> None:
@@ -128,7 +125,6 @@ def test_only_valid_and_finite_rows_take_part() -> None:
     assert usable(query).tolist() == [True, False, False, True]
     for rows in (tvcbf_rows(query, 1.0, 0.0), cbf_rows(query, 1.0, 0.0), hyperplane_rows(query, 1.0, 0.1)):
         assert rows.G.shape == (2, 2)
-        assert rows.names == rows.names[:1] * 2
         assert np.isfinite(rows.rhs).all()
     assert tvcbf_rows(query, 1.0, 0.0).G.tolist() == [[0.0, -1.0], [-6.0, -7.0]]
 
@@ -137,7 +133,6 @@ def test_stack() -> None:
     first, second = (tvcbf_rows(rows_query([0.1, 0.2], [True, True]), 1.0, 0.0) for _ in range(2))
     both = stack([first, second], 2)
     assert both.G.shape == (4, 2)
-    assert both.names == ("tvcbf",) * 4
     assert stack([], 3).G.shape == (0, 3)
     assert stack([first], 2) is first
 

@@ -35,7 +35,6 @@ def test_rows_symbol_by_symbol() -> None:
     assert rows.rhs == pytest.approx([3.0 * (0.01 - 0.02), 3.0 * (0.5 - 0.02)])
     assert rows.soft.all()
     assert not rows.delta.any()
-    assert rows.names == ("self-collision",) * 2
 
 
 @settings(max_examples=3)
