@@ -88,7 +88,12 @@ def one(words: list[str], call: Callable[[list[str]], int] = main) -> dict[str, 
     return {
         "status": status,
         "s": time.process_time() - began,
-        "err": err.getvalue()[-2000:],
+        "err": _ends(err.getvalue()),
         "seen": list(seen),
         "MB": peak_mb(),
     }
+
+
+def _ends(text: str) -> str:
+    """The beginning and the end of a long text."""
+    return text if len(text) <= 4000 else f"{text[:1500]} ... {text[-1500:]}"
