@@ -40,9 +40,7 @@ LONGEST_RESTORATION = 1.0  # rad
 LONGEST_STEP = 0.35  # rad
 ACROSS = 10.0  # added to B along g, where the constraint leaves no choice: B need be positive along the surface only
 SLOWLY = 0.5  # share of the residual left by a step that is looked at again
-OVERSHOT = (
-    0.5  # share of the slope at its beginning that a step shows at its end, with the other sign, if it went too far
-)
+OVERSHOT = 0.5  # share of the first slope along a step that its end shows, with the other sign, if it went too far
 SHORT = 1e-5  # rad, of a projection that is believed
 LOCAL = 0.02  # rad: the residual above which a step takes the greatest curvature there can be
 AT_LIMIT = 1e-6  # rad: a joint nearer than this to a limit is at it

@@ -44,9 +44,9 @@ from cdfctl.types import Array
 SWINGS = 8  # one-joint turns kept as starts
 SPREAD = 12  # samples kept as starts
 ENTRIES = 8  # table entries kept as starts
-COLD_KEPT = 16  # starts that get steps, beyond the contacts asked for, in a first query
+COLD_KEPT = 8  # starts that get steps, beyond the contacts asked for, in a first query
 WIDE_KEPT = 5  # and in a later one
-COLD_SECOND = 4  # of these, those that go on after two steps
+COLD_SECOND = 6  # of these, those that go on after two steps
 WIDE_SECOND = 1
 SPARE, COLD_SPARE = 1, 2  # contacts looked for beyond those asked for, the latter in a first query
 RETRIES, COLD_RETRIES = 3, 5  # candidates finished in search of new contacts, the latter in a first query
