@@ -66,30 +66,31 @@ class Predictor:
         call."""
         if scene.shapes is not self._shapes:
             self._shapes, self._course = scene.shapes, _empty(parts_of(scene.shapes))
-        p, course = self._prediction, self._course
+            self._off = np.linalg.norm(self._course.block[:, :3], axis=1)
+        p = self._prediction
         now = moved(scene, p.delay) if p.delay > 0.0 else scene
         m = len(scene)
-        twist = scene.twists[:, None, :]
-        knot, pose = np.zeros((m, 1)), now.poses[:, None, :]
+        knot, pose, twist = np.zeros((m, 1)), now.poses[:, None, :], scene.twists[:, None, :]
         if self._known is not None:
             knot, pose, twist = self._pieces(scene, t + p.delay, knot, pose, twist)
-        rotation = np.empty((*knot.shape, 3, 3))
+        if knot.shape != self._course.knot.shape:
+            self._course = _with_pieces(self._course, knot.shape[1])
+        course = self._course
+        o, block, rotation = course.obstacle, course.block, course.rotation
+        course.knot[:], course.position[:], course.twist[:] = knot, pose[:, :, :3], twist
         turn_obstacles(np.ascontiguousarray(pose.reshape(-1, 7)), rotation.reshape(-1, 3, 3))
-        position, o = pose[:, :, :3], course.obstacle
-        speed = np.linalg.norm(twist[:, :, :3], axis=2).max(axis=1)
-        turning = np.linalg.norm(twist[:, :, 3:], axis=2).max(axis=1)
-        arm = np.linalg.norm(course.block[:, :3], axis=1)
-        margin = course.margin
+        speed = np.sqrt(np.einsum("mki,mki->mk", twist[:, :, :3], twist[:, :, :3])).max(axis=1)
+        turning = np.sqrt(np.einsum("mki,mki->mk", twist[:, :, 3:], twist[:, :, 3:])).max(axis=1)
+        margin, kept = course.margin, p.margin + p.position_error
         margin[:, 1] = p.velocity_error * np.linalg.norm(scene.twists[:, :3], axis=1)
-        margin[:, 0] = p.margin + p.position_error + np.minimum(margin[:, 1] * p.delay, WIDEST)
-        margin[:, 2] = p.margin + p.position_error + WIDEST
-        course.pace[:] = speed[o] + turning[o] * (arm + course.block[:, 3]) + margin[o, 1]
-        course.straight[:] = (turning[o] * arm == 0.0) & (knot.shape[1] == 1)
-        course.line[:, :3] = position[o, 0] + np.einsum("bij,bj->bi", rotation[o, 0], course.block[:, :3])
-        course.line[:, 3:] = twist[o, 0, :3]
-        return course._replace(
-            knot=knot, rotation=rotation, position=np.ascontiguousarray(position), twist=np.ascontiguousarray(twist)
-        )
+        margin[:, 0] = kept + np.minimum(margin[:, 1] * p.delay, WIDEST)
+        margin[:, 2] = kept + WIDEST
+        off = turning[o] * self._off
+        course.pace[:] = speed[o] + off + turning[o] * block[:, 3] + margin[o, 1]
+        course.straight[:] = (off == 0.0) & (knot.shape[1] == 1)
+        course.line[:, :3] = course.position[o, 0] + np.einsum("bij,bj->bi", rotation[o, 0], block[:, :3])
+        course.line[:, 3:] = course.twist[o, 0, :3]
+        return course
 
     def _pieces(self, scene: Scene, now: float, knot: Array, pose: Array, twist: Array) -> tuple[Array, Array, Array]:
         assert self._known is not None
@@ -130,3 +131,10 @@ def _empty(parts: Parts) -> Course:
         twist=np.zeros((m, 1, 6)),
         margin=np.zeros((m, 3)),
     )
+
+
+def _with_pieces(course: Course, K: int) -> Course:
+    """The same obstacles, with room for ``K`` pieces of motion."""
+    m = len(course.knot)
+    room = {"knot": (m, K), "rotation": (m, K, 3, 3), "position": (m, K, 3), "twist": (m, K, 6)}
+    return Course(**{**course.members(), **{name: np.zeros(shape) for name, shape in room.items()}})

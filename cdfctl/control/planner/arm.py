@@ -7,11 +7,11 @@ to tell anything, the cover gives a tighter one; only then is the exact distance
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
 from cdfctl.fields.kernel.body import Body, body_of
+from cdfctl.fields.kernel.structs import Struct
 from cdfctl.robots.convex import ConvexPiece, convex_hull
 from cdfctl.robots.robot import Robot
 from cdfctl.types import Array, BoolArray, IntArray
@@ -20,7 +20,7 @@ COVER = 16  # balls that cover a piece
 TURNS = 400  # steps of the search for the smallest ball around some points; its error falls as 1 / TURNS
 
 
-class Arm(NamedTuple):
+class Arm(Struct):
     """A robot of n joints and k convex pieces.
 
     Attributes:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import NamedTuple
 
 from cdfctl.control.planner.jit import njit_inline
 from cdfctl.fields.kernel.body import turn
 from cdfctl.fields.kernel.sets import ConvexSets
+from cdfctl.fields.kernel.structs import Struct
 from cdfctl.fields.kernel.vec import Rot, Vec, along, compose, rot, vec
 from cdfctl.types import Array, BoolArray, IntArray
 
 
-class Course(NamedTuple):
+class Course(Struct):
     """m obstacles of p convex parts in b blocks, each moving by K pieces of constant twist; times from now on, s.
 
     Attributes:

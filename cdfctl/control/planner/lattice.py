@@ -10,7 +10,6 @@ step goes on where it was. Random motions, which spread from where the robot is 
 from __future__ import annotations
 
 from math import ceil, floor, inf, pi
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from cdfctl.control.planner.course import Course
 from cdfctl.control.planner.jit import njit
 from cdfctl.control.planner.march import STEP, Space, march
 from cdfctl.control.planner.plan import Aim, straight
+from cdfctl.fields.kernel.structs import Struct
 from cdfctl.robots.robot import Robot
 from cdfctl.types import Array, BoolArray, IntArray
 
@@ -30,7 +30,7 @@ TRIES = 12  # nodes of a way from which the straight one is tried
 CELLS = (2 * NEAR + 1) ** 2  # of a layer, about the robot, that it may reach by then
 
 
-class Lattice(NamedTuple):
+class Lattice(Struct):
     """K layers of C1 x C2 cells.
 
     Attributes:

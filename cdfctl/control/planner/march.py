@@ -14,7 +14,6 @@ the exact distance.
 from __future__ import annotations
 
 from math import cos, inf, sin, sqrt
-from typing import NamedTuple
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from cdfctl.control.planner.arm import Arm
 from cdfctl.control.planner.course import Course, pose_at
 from cdfctl.control.planner.jit import njit, njit_inline
 from cdfctl.fields.kernel.gjk import Simplex, core_distance, new_simplex
+from cdfctl.fields.kernel.structs import Struct
 from cdfctl.fields.kernel.vec import Rot, Vec, add, compose, dot, rot, rotate, rotate_back, sub, transpose, vec, vec3
 from cdfctl.types import Array
 
@@ -33,7 +33,7 @@ ROOM = 0.01  # m
 LONG = 0.25  # s: no advance is longer; bounds on speed hold that long
 
 
-class Space(NamedTuple):
+class Space(Struct):
     """Workspace of the marches of one robot among b blocks.
 
     Attributes:

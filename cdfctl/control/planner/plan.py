@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cdfctl.control.planner.jit import njit
+from cdfctl.fields.kernel.structs import Struct
 from cdfctl.types import Array
 
 CLEAR = 0.15  # m: passing nearer than this costs
@@ -42,7 +43,7 @@ class Aim(NamedTuple):
     horizon: float
 
 
-class Plan(NamedTuple):
+class Plan(Struct):
     """A plan of up to S motions and the straight one, all in arrays of S + 1.
 
     Attributes:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from math import exp, inf, pi
-from typing import NamedTuple
 
 import numpy as np
 
 from cdfctl.control.planner.jit import njit
 from cdfctl.control.planner.plan import CLEAR, Aim, Plan, bound_motion, free_cost, straight
 from cdfctl.control.planner.random import Stream, normal, uniform
+from cdfctl.fields.kernel.structs import Struct
 from cdfctl.types import Array, IntArray
 
 LOCAL = 0.35  # share of the random motions that start on the best plan
@@ -17,7 +17,7 @@ BETWEEN = 0.6  # share of them that start in the middle of an edge
 LONGEST = 1.5  # s: longest motion toward a random configuration
 
 
-class Tree(NamedTuple):
+class Tree(Struct):
     """Up to N nodes (configuration, time); node 0 is where the robot is now. S is the most edges of a way.
 
     Attributes:
