@@ -18,6 +18,7 @@ from cdfctl.control.parameters import Parameters
 from cdfctl.control.planner.planner import Planner, Settings
 from cdfctl.control.prediction import KnownMotion, Prediction, Predictor
 from cdfctl.control.reaching import moved
+from cdfctl.control.tracking import Tracker
 from cdfctl.robots.robot import Robot
 from cdfctl.scenario.variants import Variant
 from cdfctl.types import Array, Decision, Rows, Scene
@@ -42,12 +43,14 @@ class PredictiveCore(Core):
         budget = inf if p.budget_ms is None else 1e-3 * p.budget_ms
         settings = Settings(p.segments, p.horizon, p.candidates, budget, p.planner_seed)
         self._planner = Planner(robot, settings, dt)
+        self._tracker = Tracker(dt)
         self._predictor = Predictor(Prediction(p.margin, p.delay, p.position_error, p.velocity_error), known)
 
     def reset(self) -> None:
         """Forget the steps so far."""
         super().reset()
         self._planner.reset()
+        self._tracker.reset()
 
     def step(self, q: Array, scene: Scene, u_ref: Array, task: Rows | None = None) -> Decision:
         """The command nearest to going on at ``u_ref`` (n,) for the horizon: the safety filter's way to use plans.
@@ -80,7 +83,8 @@ class PredictiveCore(Core):
         """
         check_scene(scene)
         speed = self.robot.velocity_limit if speed is None else speed
-        found = self._planner.plan(q, self._predictor.course(scene, t), goal, speed, stay)
+        scene = self._tracker.update(scene)
+        found = self._planner.plan(q, self._predictor.course(scene, t - self._delay), goal, speed, stay)
         now = moved(scene, self._delay) if self._delay > 0.0 else scene
         decision = (super().step if found.hit < REACT else self.follow)(q, now, found.u)
         if found.hit < inf:

@@ -15,6 +15,7 @@ from cdfctl.scenario.problems import path_text
 from cdfctl.scenario.resolve import resolve
 from cdfctl.scenario.schema import ReachTask, Scenario
 from cdfctl.scenario.values import Complaint, Place
+from cdfctl.scenario.variants import VARIANTS
 from cdfctl.simulation.checks import robot_complaints, robot_of, scenario_complaints
 from cdfctl.simulation.drawing import draw_trial
 from cdfctl.simulation.goals import Goal, Touch, goal_of
@@ -150,7 +151,12 @@ def _assemble(scenario: Scenario, trial: int, robot: Robot) -> Trial:
     motion, guard = SceneMotion(scenario.obstacles), None
     if scenario.feed is not None:
         motion = MeasuredMotion(scenario.obstacles, scenario.feed)
-    controller = build(robot, scenario.controller, scenario.task, simulation.dt, motion)
+    config, measurement = scenario.controller, scenario.measurement
+    if VARIANTS[config.variant].plans and measurement.compensate_delay and measurement.delay > 0.0:
+        # It makes up for the delay itself, with velocities that it has corrected.
+        config = config.model_copy(update={"delay": measurement.delay})
+        measurement = measurement.model_copy(update={"compensate_delay": False})
+    controller = build(robot, config, scenario.task, simulation.dt, motion)
     target: SceneMotion | None = None
     goal: Goal
     if isinstance(scenario.task, ReachTask):
@@ -164,7 +170,7 @@ def _assemble(scenario: Scenario, trial: int, robot: Robot) -> Trial:
     if isinstance(motion, MeasuredMotion):
         guard = Guard(controller, motion)
         plant = plant if isinstance(scenario.plant, FrankaConfig) else PacedPlant(plant)
-    errors = scenario.measurement, scenario.seed, trial
+    errors = measurement, scenario.seed, trial
     rollout = Rollout(
         guard if guard is not None else controller,
         plant,

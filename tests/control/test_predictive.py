@@ -49,6 +49,27 @@ def test_it_finds_a_narrow_way_that_random_motions_miss():
     assert run("X1", "seed=1", trial=98).verdict.outcome == "reached"
 
 
+ERRORS = [f"measurement.{e}" for e in ("position_noise=0.01", "speed_error=0.2", "heading_error_deg=10", "delay=0.1")]
+
+
+def test_it_finds_out_how_wrong_its_velocities_are():
+    """X2, all errors at once: the plan of step 20 ends where the discs then are, not where they are said to go."""
+    trial = assemble(load_scenario("X2", [f"controller.variant={NAME}", *FEW, *ERRORS]), trial=2)
+    planner, told = trial.rollout._controller.core, []
+    for step in trial.run():
+        told.append(planner._predictor._course.line.copy())
+        if step.index == 20:
+            break
+
+    def error(k):
+        truth = trial.motion.at(0.1 * k)
+        return np.abs(told[k] - np.hstack([truth.poses[:, :3], truth.twists[:, :3]])).max(axis=0)
+
+    assert error(0)[3:].max() > 0.1
+    assert error(20)[3:].max() < 0.05
+    assert error(20)[:3].max() < 0.03
+
+
 def test_a_scenario_gives_the_same_run_twice():
     first, second = (run("S2", trial=3).trajectory for _ in range(2))
     np.testing.assert_array_equal(first.q, second.q)

@@ -1,7 +1,8 @@
 """The search of :mod:`cdfctl.control.planner.lattice` from step to step: when it goes on, and when it begins anew.
 
-There are two lattices. The one with wide cells is searched first: it has an eighth as many of them as the other, and
-most ways that are there are on both.
+There are lattices of wide and of narrow cells. Wide ones are searched first: there are an eighth as many of them as of
+the others, and most ways that are there are on both. Where neither has a way that keeps its margins, one that keeps a
+third of them is better than none.
 """
 
 from __future__ import annotations
@@ -12,14 +13,14 @@ import numpy as np
 
 from cdfctl.control.planner.arm import Arm
 from cdfctl.control.planner.course import Course
-from cdfctl.control.planner.lattice import EXTRA, Lattice, find, leave, new_lattice
-from cdfctl.control.planner.march import Space
+from cdfctl.control.planner.lattice import EXTRA, Lattice, find, forget, leave, new_lattice
+from cdfctl.control.planner.march import KEPT, NARROW, Space
 from cdfctl.control.planner.plan import Aim
 from cdfctl.control.planner.tree import Tree
 from cdfctl.robots.robot import Robot
 from cdfctl.types import Array
 
-WIDTHS = 0.4, 0.2  # rad or m: about the width of a cell
+LEVELS = (0.4, KEPT), (0.2, KEPT), (0.4, NARROW), (0.2, NARROW)  # width of a cell (about), rad or m; margins asked for
 STALE = 0.05  # m: an obstacle that is, or in a second will be, so far from where it was predicted makes dead cells void
 
 
@@ -42,12 +43,22 @@ class Guide:
 
     def begin(self, course: Course, aim: Aim) -> None:
         """A step at which no plan is at hand."""
-        if not self._lattices or not np.array_equal(self._goal, aim.goal) or self._now > EXTRA or self._void(course):
-            self._lattices = [new_lattice(self._robot, aim.goal, w, self._horizon, self._dt) for w in WIDTHS]
-            self._goal, self._sets, self._line, self._now = aim.goal.copy(), course.sets, course.line.copy(), 0.0
+        new = not self._lattices or not np.array_equal(self._goal, aim.goal)
+        if new:
+            self._lattices = [new_lattice(self._robot, aim.goal, w, self._horizon, self._dt) for w, _ in LEVELS]
+            self._goal = aim.goal.copy()
+        if new or self._now > EXTRA or self._void(course):
+            self._sets, self._line, self._now = course.sets, course.line.copy(), 0.0
+            for lattice in self._lattices:
+                forget(lattice)
         for lattice in self._lattices:
             leave(lattice)
         self._level, self.found = 0, -1
+
+    @property
+    def grade(self) -> int:
+        """How much of its margins the way found keeps."""
+        return LEVELS[self._level][1]
 
     def _void(self, course: Course) -> bool:
         if course.sets is not self._sets:
@@ -64,7 +75,7 @@ class Guide:
         has: -1 for none.
         """
         lattice = self._lattices[self._level]
-        done = find(arm, course, aim, lattice, q, self._now, effort, space)
+        done = find(arm, course, aim, lattice, q, self._now, self.grade, effort, space)
         count = int(lattice.state[3])
         self.found = count if 0 < count <= len(tree.tau) else -1
         if self.found > 0:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from cdfctl.control.planner.arm import Arm
 from cdfctl.control.planner.course import Course
 from cdfctl.control.planner.jit import njit
-from cdfctl.control.planner.march import STEP, Space, march
+from cdfctl.control.planner.march import Space, march
 from cdfctl.control.planner.plan import Aim, straight
 from cdfctl.fields.kernel.structs import Struct
 from cdfctl.robots.robot import Robot
@@ -27,6 +27,7 @@ JOINTS = 2  # robots with more have too many cells
 EXTRA = 4.0  # s: the layers go that far beyond the horizon, and are used so long
 NEAR = 3  # layers to whose cells the robot may go straight from where it is
 TRIES = 12  # nodes of a way from which the straight one is tried
+UNKNOWN, FREE, DEAD = 0, 1, 2  # of a cell: free itself, or no way leads on from there
 CELLS = (2 * NEAR + 1) ** 2  # of a layer, about the robot, that it may reach by then
 
 
@@ -38,7 +39,7 @@ class Lattice(Struct):
         width: (2,) of a cell, rad or m.
         wraps: (2,) the joint turns without end.
         origin: (2,) the goal's cell.
-        seen: (K, C1, C2) the cell is dead, or on the way that is being followed.
+        seen: (K, C1, C2) what is known of a cell; ``DEAD`` also while it is on the way that is being followed.
         way: (K, 4) that way: layer, cell and the next edge to be tried.
         state: (4,) cells on the way; the next first cell to be tried; 1 where there are no more; motions of the way.
         at: (2, 2) configurations of two cells.
@@ -86,17 +87,27 @@ def new_lattice(robot: Robot, goal: Array, width: float, horizon: float, dt: flo
 
 
 @njit
+def forget(lattice: Lattice) -> None:
+    """No cell is dead any more."""
+    for k in range(lattice.seen.shape[0]):
+        for i in range(lattice.seen.shape[1]):
+            for j in range(lattice.seen.shape[2]):
+                lattice.seen[k, i, j] = UNKNOWN
+    lattice.state[0] = lattice.state[1] = lattice.state[2] = 0
+
+
+@njit
 def leave(lattice: Lattice) -> None:
     """Begin again from where the robot is now; dead cells stay dead."""
     for s in range(lattice.state[0]):
         k, i, j, _ = lattice.way[s]
-        lattice.seen[k, i, j] = 0
+        lattice.seen[k, i, j] = FREE
     lattice.state[0] = lattice.state[1] = lattice.state[2] = 0
 
 
 @njit
 def find(
-    arm: Arm, course: Course, aim: Aim, lattice: Lattice, q: Array, now: float, effort: float, space: Space
+    arm: Arm, course: Course, aim: Aim, lattice: Lattice, q: Array, now: float, grade: int, effort: float, space: Space
 ) -> bool:
     """Go on with the search from q (2,) at ``now`` (s since the first layer), until the goal is reached, there is no
     way to it, or ``effort`` distances have been evaluated: whether one of the first two is so.
@@ -104,14 +115,14 @@ def find(
     The way, or as far as it was followed, is unfolded; ``state[3]`` is how many motions it has.
     """
     space.looks[0] = 0.0
-    done = _follow(arm, course, aim, lattice, q, now, effort, space)
-    lattice.state[3] = _unfold(arm, course, aim, lattice, q, now, space)
+    done = _follow(arm, course, aim, lattice, q, now, grade, effort, space)
+    lattice.state[3] = _unfold(arm, course, aim, lattice, q, now, grade, space)
     return done or lattice.state[2] == 1
 
 
 @njit
 def _follow(
-    arm: Arm, course: Course, aim: Aim, lattice: Lattice, q: Array, now: float, effort: float, space: Space
+    arm: Arm, course: Course, aim: Aim, lattice: Lattice, q: Array, now: float, grade: int, effort: float, space: Space
 ) -> bool:
     """Follow edges until the goal is reached, or no more are to be followed: whether it is."""
     state, way, seen, layer, at = lattice.state, lattice.way, lattice.seen, lattice.layer, lattice.at
@@ -146,7 +157,7 @@ def _follow(
             i %= seen.shape[1]
         if lattice.wraps[1]:
             j %= seen.shape[2]
-        if i < 0 or i >= seen.shape[1] or j < 0 or j >= seen.shape[2] or seen[k, i, j] > 0:
+        if i < 0 or i >= seen.shape[1] or j < 0 or j >= seen.shape[2] or seen[k, i, j] == DEAD:
             continue
         _place(lattice, aim, at[0], i, j, 1)
         fits = True
@@ -155,17 +166,23 @@ def _follow(
             fits = fits and abs(u[n]) <= aim.limit[n] * (1.0 + 1e-9)
         if not fits:
             continue
-        hit, _ = march(arm, course, at[0], u, start, end, 0.0, STEP, space)
+        # Most of the edges that are not free end in a cell that is not: it is looked at once for all of them.
+        if seen[k, i, j] == UNKNOWN:
+            hit, _ = march(arm, course, at[1], u, end, end, 0.0, grade, space)
+            seen[k, i, j] = FREE if hit == inf else DEAD
+            if hit < inf:
+                continue
+        hit, _ = march(arm, course, at[0], u, start, end, 0.0, grade, space)
         if hit < inf:
             continue
-        seen[k, i, j] = 1
+        seen[k, i, j] = DEAD
         way[s, 0], way[s, 1], way[s, 2], way[s, 3] = k, i, j, 0
         state[0] += 1
         if i == lattice.origin[0] and j == lattice.origin[1]:
             if aim.stay <= end:
                 return True
             u[0] = u[1] = 0.0
-            hit, _ = march(arm, course, aim.goal, u, end, aim.stay, 0.0, STEP, space)
+            hit, _ = march(arm, course, aim.goal, u, end, aim.stay, 0.0, grade, space)
             if hit == inf:
                 return True
     return False
@@ -201,7 +218,9 @@ def _place(lattice: Lattice, aim: Aim, q: Array, i: int, j: int, which: int) -> 
 
 
 @njit
-def _unfold(arm: Arm, course: Course, aim: Aim, lattice: Lattice, q: Array, now: float, space: Space) -> int:
+def _unfold(
+    arm: Arm, course: Course, aim: Aim, lattice: Lattice, q: Array, now: float, grade: int, space: Space
+) -> int:
     """The way followed at present, from q (2,), into ``move`` and ``tau``: how many motions.
 
     It leaves for the goal as soon as the straight way is free, and neighbouring motions are made one where that is.
@@ -221,26 +240,57 @@ def _unfold(arm: Arm, course: Course, aim: Aim, lattice: Lattice, q: Array, now:
         t = end
         ahead = straight(aim, at[0], u)
         if s % every == 0 and ahead > layer and t + ahead >= aim.stay:
-            hit, _ = march(arm, course, at[0], u, t, t + ahead, 0.0, STEP, space)
+            hit, _ = march(arm, course, at[0], u, t, t + ahead, 0.0, grade, space)
             if hit == inf:
                 count = s + 1
                 break
-    for _ in range(3):
-        kept, t = 0, 0.0
+    return _joined(arm, course, lattice, q, count, grade, space)
+
+
+@njit
+def _joined(arm: Arm, course: Course, lattice: Lattice, q: Array, count: int, grade: int, space: Space) -> int:
+    """The first ``count`` motions from q (2,), as many of them made one as are free as one: how many there are then.
+
+    From each configuration on, twice as many are tried until that is not free, then half as many more, and so on.
+    """
+    move, tau, at, last = lattice.move, lattice.tau, lattice.at, lattice.seen.shape[0]
+    kept, t, first = 0, 0.0, 0
+    for n in range(2):
+        at[0, n] = q[n]
+    while first < count:
+        most, step = 1, 1  # motions that are free as one; how many more are tried
+        growing = True
+        while step > 0:
+            if most + step <= count - first:
+                _mean(lattice, first, most + step)
+                end = t + float(tau[last])
+                hit, _ = march(arm, course, at[0], move[last], t, end, 0.0, grade, space)
+                if hit == inf:
+                    most += step
+                    step = 2 * step if growing else step // 2
+                    continue
+            growing = False
+            step //= 2
+        _mean(lattice, first, most)
+        first += most
+        tau[kept] = tau[last]
         for n in range(2):
-            at[0, n] = q[n]
-        for s in range(1, count):
-            both = tau[kept] + tau[s]
-            for n in range(2):
-                u[n] = (move[kept, n] * tau[kept] + move[s, n] * tau[s]) / both
-            hit, _ = march(arm, course, at[0], u, t, t + both, 0.0, STEP, space)
-            if hit < inf:
-                t += tau[kept]
-                for n in range(2):
-                    at[0, n] += move[kept, n] * tau[kept]
-                kept += 1
-            for n in range(2):
-                move[kept, n] = u[n] if hit == inf else move[s, n]
-            tau[kept] = both if hit == inf else tau[s]
-        count = min(count, kept + 1)
-    return count
+            move[kept, n] = move[last, n]
+            at[0, n] += move[kept, n] * tau[kept]
+        t += tau[kept]
+        kept += 1
+    return kept
+
+
+@njit
+def _mean(lattice: Lattice, first: int, count: int) -> None:
+    """The one motion that leads where ``count`` motions from ``first`` on lead, behind all others."""
+    move, tau, last = lattice.move, lattice.tau, lattice.seen.shape[0]
+    tau[last] = 0.0
+    for s in range(first, first + count):
+        tau[last] += tau[s]
+    for n in range(2):
+        total = 0.0
+        for s in range(first, first + count):
+            total += move[s, n] * tau[s]
+        move[last, n] = total / tau[last]

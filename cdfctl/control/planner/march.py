@@ -26,6 +26,9 @@ from cdfctl.fields.kernel.vec import Rot, Vec, add, compose, dot, rot, rotate, r
 from cdfctl.types import Array
 
 STEP = 0.01  # m: how far a distance may fall below the margin unseen, if that is not more than half the margin
+FULL, KEPT, NARROW, NARROW_KEPT = 0, 1, 2, 3
+"""How much of a margin is asked for: all; all but ``STEP`` of a plan that had all; a third where no plan keeps more;
+and half of that of a plan that had a third."""
 LEAST_STEP = 1e-4  # m: but never less than this, or no motion would end
 SHORT = 0.06  # s: a bound that allows a longer advance is not made tighter
 SHORTER = 0.012  # s: nor is the exact distance computed where the cover allows this and ``ROOM``
@@ -130,11 +133,21 @@ def place(arm: Arm, q: Array, u: Array, s: float, space: Space) -> None:
         piece[k, 4] = speed
 
 
+@njit_inline
+def ease(margin: float, grade: int) -> float:
+    """How much of a margin is waived."""
+    if grade == FULL:
+        return 0.0
+    if grade == KEPT:
+        return min(STEP, margin / 3.0)
+    return margin * (2.0 / 3.0 if grade == NARROW else 5.0 / 6.0)
+
+
 @njit
 def march(
-    arm: Arm, course: Course, q: Array, u: Array, start: float, end: float, near: float, ease: float, space: Space
+    arm: Arm, course: Course, q: Array, u: Array, start: float, end: float, near: float, grade: int, space: Space
 ) -> tuple[float, float]:
-    """Follow q + u (t - start) from ``start`` to ``end`` (s from now), every margin less by ``ease`` (m).
+    """Follow q + u (t - start) from ``start`` to ``end`` (s from now), every margin eased by ``grade``.
 
     Returns the time at which a margin is found broken, inf for none, and the least distance seen, at most ``near`` (m),
     less the widening of the margin.
@@ -173,7 +186,7 @@ def march(
                 c = rotate(r, vec(course.block, i))
                 x, y, z = p[0] + c[0], p[1] + c[1], p[2] + c[2]
             margin = min(course.margin[o, 0] + t * course.margin[o, 1], course.margin[o, 2])
-            eased = min(ease, margin / 3.0)
+            eased = ease(margin, grade)
             margin -= eased
             step = min(STEP, max(LEAST_STEP, 0.5 * margin))
             widened = margin + eased - course.margin[o, 0]

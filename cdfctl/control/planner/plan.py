@@ -49,7 +49,8 @@ class Plan(Struct):
     Attributes:
         u: (S+1, n) velocities, rad/s.
         tau: (S+1,) durations, s; 0 for a motion that is not there. The last is the straight way to the goal.
-        value: (3,) cost, s; when a margin is broken, inf for never; least distance, m, at most ``CLEAR``.
+        value: (4,) cost, s; when a margin is broken, inf for never; least distance, m, at most ``CLEAR``; the grade
+            of its margins (see :mod:`cdfctl.control.planner.march`).
     """
 
     u: Array
@@ -59,7 +60,7 @@ class Plan(Struct):
 
 def new_plan(segments: int, n: int) -> Plan:
     """No plan: it costs more than any."""
-    return Plan(np.zeros((segments + 1, n)), np.zeros(segments + 1), np.array([inf, 0.0, 0.0]))
+    return Plan(np.zeros((segments + 1, n)), np.zeros(segments + 1), np.array([inf, 0.0, 0.0, 0.0]))
 
 
 @njit

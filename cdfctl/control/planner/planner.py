@@ -13,7 +13,7 @@ from cdfctl.control.planner.arm import arm_of
 from cdfctl.control.planner.course import Course
 from cdfctl.control.planner.guide import Guide
 from cdfctl.control.planner.lattice import JOINTS
-from cdfctl.control.planner.march import Space, new_space
+from cdfctl.control.planner.march import KEPT, NARROW, NARROW_KEPT, Space, new_space
 from cdfctl.control.planner.plan import Aim, new_plan, shift
 from cdfctl.control.planner.random import new_stream
 from cdfctl.control.planner.search import BOOST, search
@@ -25,7 +25,7 @@ SLICE = 20_000.0  # work between two looks at the clock, about 0.3 ms; none are 
 WORK = 60.0  # a step's work, for each candidate and joint: where trying is dear, fewer are tried
 GUIDED = 4.0  # times as much for a guide, where no plan is at hand
 SAVED = 0.25  # of it a step adds to what may be taken where no plan is free,
-BURST = 16.0  # up to so many times a step's
+BURST = 64.0  # up to so many times a step's
 
 
 @dataclass(frozen=True)
@@ -131,15 +131,19 @@ class Planner:
         search, clock = self._searching(course, aim, q), _Clock(settings.budget)
         most = settings.candidates * robot.n * WORK
         self._saved = min(self._saved + SAVED * most, BURST * most)
+        grade = KEPT if self._best.value[3] < NARROW else NARROW_KEPT
         given, enough, work = recall(self._best, self._tree), BOOST * settings.candidates, 0.0
         first = 0
         if self._guide is not None:
-            first = search(0, given, enough, 0.0, 0.0)  # the plan of the last step, and the straight way
+            first = search(0, given, grade, enough, 0.0, 0.0)  # the plan of the last step, and the straight way
+            if self._best.value[1] < inf and given > 0 and grade == KEPT:
+                plant(self._tree, q)
+                first = search(first, given, NARROW_KEPT, first, 0.0, 0.0)
             given = -1
             if self._best.value[1] < inf:
                 given, work = self._guided(self._guide, course, aim, q, clock, GUIDED * most + self._saved)
                 self._saved -= max(0.0, work - GUIDED * most)
-                first = search(first, given, settings.candidates, 0.0, 0.0)
+                first = search(first, given, self._guide.grade, settings.candidates, 0.0, 0.0)
                 given, work, enough = -1, 0.0, settings.candidates
         # While no plan is free a step may take what those before it have saved.
         more = most + min((BOOST - 1) * most, self._saved)
@@ -147,18 +151,18 @@ class Planner:
             if clock.over():
                 break
             part = SLICE if settings.budget < inf else inf
-            first = search(first, given, enough, min(part, most - work), min(part, more - work))
+            first = search(first, given, grade, enough, min(part, most - work), min(part, more - work))
             work, given = work + float(self._space.looks[0]), -1
         self._saved -= max(0.0, work - most)
         return self._found(q)
 
-    def _searching(self, course: Course, aim: Aim, q: Array) -> Callable[[int, int, int, float, float], int]:
+    def _searching(self, course: Course, aim: Aim, q: Array) -> Callable[[int, int, int, int, float, float], int]:
         """The search of a step, but for the numbers that say how far it goes."""
 
-        def part(first: int, given: int, enough: int, free: float, effort: float) -> int:
+        def part(first: int, given: int, grade: int, enough: int, free: float, effort: float) -> int:
             return search(
-                self._arm, course, aim, self._best, self._tree, q, first, given, self._settings.candidates, enough,
-                free, effort, self._stream, self._space,
+                self._arm, course, aim, self._best, self._tree, q, first, given, grade, self._settings.candidates,
+                enough, free, effort, self._stream, self._space,
             )  # fmt: skip
 
         return part

@@ -12,7 +12,7 @@ from math import inf
 from cdfctl.control.planner.arm import Arm
 from cdfctl.control.planner.course import Course
 from cdfctl.control.planner.jit import njit
-from cdfctl.control.planner.march import STEP, Space, march
+from cdfctl.control.planner.march import FULL, NARROW, Space, march
 from cdfctl.control.planner.plan import CLEAR, Aim, Plan, bound_motion, free_cost, hit_cost, straight
 from cdfctl.control.planner.random import Stream, uniform
 from cdfctl.control.planner.tree import (
@@ -30,6 +30,7 @@ TOWARD = 0.7  # share of the others that go toward a random configuration and ti
 BOOST = 4  # times as many candidates while no plan is free
 GOOD = 1e-3  # s: nothing is sought that is better by less
 REST = 1.0  # s: how long the goal should stay free after arrival, where the task does not say
+TIGHT = 2.0  # s: what a plan costs more that keeps only a part of its margins
 BACK = 0.02  # s: a motion that breaks a margin is kept until this long before
 
 
@@ -43,6 +44,7 @@ def search(
     q: Array,
     first: int,
     given: int,
+    grade: int,
     candidates: int,
     enough: int,
     effort: float,
@@ -56,12 +58,12 @@ def search(
     ``search_effort`` while none is, distances have been evaluated.
 
     Candidate 0 is the straight way, the others are drawn; but first the ``given`` motions in ``tree.move`` are tried,
-    where that is not negative. Returns the number to go on with; ``enough`` means that all is done.
+    where that is not negative, and ``grade`` says how much of their margins they must keep. Returns the
+    number to go on with; ``enough`` means that all is done.
     """
     space.looks[0] = 0.0
     if given >= 0:
-        # They were free, but for the STEP that a check may miss: seen from another instant, that must not end them.
-        _follow(arm, course, aim, best, tree, 0, given, STEP, space)
+        _follow(arm, course, aim, best, tree, 0, given, grade, space)
     least_cost = straight(aim, q, tree.work) + GOOD
     for c in range(first, enough):
         free = c > 0 and best.value[1] == inf
@@ -81,13 +83,13 @@ def search(
                     node = propose_random(aim, tree, stream)
             if count == 0 or node < 0:
                 continue
-        _follow(arm, course, aim, best, tree, node, count, 0.0, space)
+        _follow(arm, course, aim, best, tree, node, count, FULL, space)
     return enough
 
 
 @njit
 def _follow(
-    arm: Arm, course: Course, aim: Aim, best: Plan, tree: Tree, node: int, count: int, ease: float, space: Space
+    arm: Arm, course: Course, aim: Aim, best: Plan, tree: Tree, node: int, count: int, grade: int, space: Space
 ) -> None:
     """Try ``count`` motions from ``node``, then the straight way, then rest: new nodes, and perhaps a better plan.
 
@@ -95,6 +97,8 @@ def _follow(
     """
     n, way = tree.work.shape[0], tree.move.shape[0] - 2
     arrival, must, cost, passed = 0.0, 0.0, 0.0, CLEAR
+    grade = max(grade, int(tree.at[node, 4]))
+    tight = TIGHT if grade >= NARROW else 0.0
     for i in range(count + 2):
         free = best.value[1] == inf
         start, least = tree.at[node, 0], tree.at[node, 2]
@@ -106,14 +110,14 @@ def _follow(
             for j in range(n):
                 tree.work[j] = tree.q[node, j] + tau * u[j]
             ahead = straight(aim, tree.work, tree.move[way])
-            if free and free_cost(start + tau + ahead, least) >= best.value[0] - GOOD:
+            if free and free_cost(start + tau + ahead, least) + tight >= best.value[0] - GOOD:
                 return
             for j in range(n):
                 tree.work[j] = tree.q[node, j]
         elif i == count:
             u = tree.move[way]
             tau = straight(aim, tree.q[node], u)
-            if free and free_cost(start + tau, least) >= best.value[0]:
+            if free and free_cost(start + tau, least) + tight >= best.value[0]:
                 return
             for j in range(n):
                 tree.work[j] = tree.q[node, j]
@@ -125,23 +129,23 @@ def _follow(
                 tree.work[j] = tree.q[node, j] + tree.move[way, j] * (arrival - start)
                 u[j] = 0.0
             start, tau = arrival, max(must, REST)
-        hit, d = march(arm, course, tree.work, u, start, start + tau, CLEAR, ease, space)
+        hit, d = march(arm, course, tree.work, u, start, start + tau, CLEAR, grade, space)
         least = min(least, d)
         if i < count:
             if hit < inf:
                 if not free and hit_cost(hit, least) < best.value[0]:
-                    keep(best, tree, node, u, hit - start, hit_cost(hit, least), hit, least)
+                    keep(best, tree, node, u, hit - start, hit_cost(hit, least), hit, least, grade)
                 if hit - start > 2.0 * BACK:
-                    add_node(tree, node, u, hit - start - BACK, tree.at[node, 2])
+                    add_node(tree, node, u, hit - start - BACK, tree.at[node, 2], grade)
                 return
-            node = add_node(tree, node, u, tau, least)
+            node = add_node(tree, node, u, tau, least, grade)
             if node < 0:
                 return
         elif i == count:
-            cost, passed = free_cost(arrival, least), least
+            cost, passed = free_cost(arrival, least) + tight, least
             if hit < inf:
                 if not free and hit_cost(hit, least) < best.value[0]:
-                    keep(best, tree, node, u, tau, hit_cost(hit, least), hit, least)
+                    keep(best, tree, node, u, tau, hit_cost(hit, least), hit, least, grade)
                 return
             if cost >= best.value[0]:
                 return
@@ -152,4 +156,4 @@ def _follow(
             elif hit < inf:
                 cost += 0.5 * (1.0 - (hit - arrival) / REST)
             if cost < best.value[0] and (stop == inf or not free):
-                keep(best, tree, node, tree.move[way], arrival - tree.at[node, 0], cost, stop, passed)
+                keep(best, tree, node, tree.move[way], arrival - tree.at[node, 0], cost, stop, passed, grade)

@@ -23,7 +23,8 @@ class Tree(Struct):
     Attributes:
         q: (N, n) configurations.
         u: (N, n) velocity of the edge that leads to a node.
-        at: (N, 4) time, duration of that edge, least distance since the root, how often it was started from.
+        at: (N, 5) time, duration of that edge, least distance since the root, how often it was started from, the worst
+            grade since the root.
         parent: (N,) the node before, -1 for the root.
         depth: (N,) edges since the root.
         used: (2,) nodes in use; the node where the best plan leaves the tree for the goal, 0 for none.
@@ -48,7 +49,7 @@ def new_tree(nodes: int, segments: int, n: int) -> Tree:
     return Tree(
         np.zeros((nodes, n)),
         np.zeros((nodes, n)),
-        np.zeros((nodes, 4)),
+        np.zeros((nodes, 5)),
         np.zeros(nodes, dtype=np.int64),
         np.zeros(nodes, dtype=np.int64),
         np.zeros(2, dtype=np.int64),
@@ -64,6 +65,7 @@ def plant(tree: Tree, q: Array) -> None:
     for j in range(q.shape[0]):
         tree.q[0, j], tree.u[0, j] = q[j], 0.0
     tree.at[0, 0], tree.at[0, 1], tree.at[0, 2], tree.at[0, 3] = 0.0, 0.0, CLEAR, 0.0
+    tree.at[0, 4] = 0.0
     tree.parent[0], tree.depth[0], tree.used[0], tree.used[1] = -1, 0, 1, 0
 
 
@@ -81,7 +83,7 @@ def recall(best: Plan, tree: Tree) -> int:
 
 
 @njit
-def add_node(tree: Tree, parent: int, u: Array, tau: float, least: float) -> int:
+def add_node(tree: Tree, parent: int, u: Array, tau: float, least: float, grade: int) -> int:
     """The node after ``tau`` at ``u`` from ``parent``; -1 where the tree is full."""
     new = int(tree.used[0])
     if new >= tree.q.shape[0]:
@@ -90,17 +92,19 @@ def add_node(tree: Tree, parent: int, u: Array, tau: float, least: float) -> int
         tree.u[new, j] = u[j]
         tree.q[new, j] = tree.q[parent, j] + tau * u[j]
     tree.at[new, 0], tree.at[new, 1], tree.at[new, 2] = tree.at[parent, 0] + tau, tau, least
-    tree.at[new, 3] = 0.0
+    tree.at[new, 3], tree.at[new, 4] = 0.0, grade
     tree.parent[new], tree.depth[new] = parent, tree.depth[parent] + 1
     tree.used[0] = new + 1
     return new
 
 
 @njit
-def keep(best: Plan, tree: Tree, node: int, u: Array, tau: float, cost: float, hit: float, least: float) -> None:
+def keep(
+    best: Plan, tree: Tree, node: int, u: Array, tau: float, cost: float, hit: float, least: float, grade: int
+) -> None:
     """The way to ``node``, then ``tau`` at ``u``, becomes the best plan."""
     last = best.tau.shape[0] - 1
-    best.value[0], best.value[1], best.value[2] = cost, hit, least
+    best.value[0], best.value[1], best.value[2], best.value[3] = cost, hit, least, grade
     for s in range(last):
         best.tau[s] = 0.0
     best.tau[last] = tau
@@ -134,7 +138,7 @@ def propose_random(aim: Aim, tree: Tree, stream: Stream) -> int:
     tree.at[node, 3] += 1.0
     if node > 0 and uniform(stream) < BETWEEN:
         share, least = uniform(stream), tree.at[node, 2]
-        node = add_node(tree, tree.parent[node], tree.u[node], share * tree.at[node, 1], least)
+        node = add_node(tree, tree.parent[node], tree.u[node], share * tree.at[node, 1], least, int(tree.at[node, 4]))
     if node < 0 or tree.depth[node] >= tree.tau.shape[0] or tree.at[node, 0] >= aim.horizon:
         return -1
     kind, n = uniform(stream), tree.work.shape[0]

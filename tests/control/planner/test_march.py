@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdfctl.control.planner.arm import arm_of
-from cdfctl.control.planner.march import STEP, march, new_space
+from cdfctl.control.planner.march import FULL, STEP, march, new_space
 from cdfctl.control.prediction import Prediction, Predictor
 from cdfctl.robots.robot import load_robot
 from cdfctl.simulation.clearance import nearest
@@ -25,7 +25,7 @@ MARGIN, RADIUS = 0.03, 0.3
 def marched(robot, scene, q, u, end, margin=MARGIN):
     arm, course = arm_of(robot), Predictor(Prediction(margin)).course(scene)
     space = new_space(arm, len(course.block))
-    return march(arm, course, np.asarray(q, float), np.asarray(u, float), 0.0, end, 0.15, 0.0, space)
+    return march(arm, course, np.asarray(q, float), np.asarray(u, float), 0.0, end, 0.15, FULL, space)
 
 
 @pytest.fixture(scope="module")

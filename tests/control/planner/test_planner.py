@@ -7,12 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from cdfctl.control.planner import planner as module
 from cdfctl.control.planner.march import STEP
 from cdfctl.control.planner.planner import Planner, Settings
 from cdfctl.control.prediction import Prediction, Predictor
 from cdfctl.robots.robot import load_robot
+from cdfctl.simulation.clearance import Clearance
 from cdfctl.simulation.judge import judge
 from cdfctl.types import Obstacle, Scene, Sphere, Trajectory
 
@@ -115,6 +117,28 @@ def test_no_plan_is_free_where_a_disc_comes_onto_the_base(robot):
     found = planned(Planner(robot, SETTINGS, 0.1), robot, Q0, scene)
     contact = (math.sqrt(5.0) - 0.5 - MARGIN) / math.sqrt(5.0)  # with the base's axis, which cannot give way
     assert 0.5 * contact < found.hit <= contact + 0.01
+
+
+def test_where_no_plan_keeps_its_margins_one_that_keeps_a_third_will_do(robot):
+    """At the start a disc stands nearer than the margin: away from it, and no nearer than a sixth of the margin."""
+    clearance = Clearance(robot, (Sphere(0.3),))
+    pose = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]])
+    middle, aside = 2.0 * np.array([np.cos(2.5), np.sin(2.5)]), np.array([-np.sin(2.5), np.cos(2.5)])
+
+    def distance(x):
+        pose[0, :2] = 0.5 * middle + x * aside
+        clearance.place(Q0, pose)
+        return clearance.distances().min()
+
+    x = brentq(lambda x: distance(x) - 0.5 * MARGIN, 0.3, 0.6)
+    assert distance(x) == pytest.approx(0.5 * MARGIN)
+    found = planned(Planner(robot, SETTINGS, 0.1), robot, Q0, Scene([Obstacle(Sphere(0.3), pose[0, :3])]))
+    assert found.hit == math.inf
+    real = np.isfinite(found.t)
+    for now in np.linspace(0.0, found.t[real][-1], 300):
+        q = np.array([np.interp(now, found.t[real], found.q[real, j]) for j in range(2)])
+        clearance.place(q, pose)
+        assert clearance.distances().min() >= MARGIN / 6.0
 
 
 def test_rest_at_the_goal_counts_where_the_task_says_so(robot):
