@@ -8,6 +8,7 @@ third of them is better than none.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 
 import numpy as np
 
@@ -30,12 +31,12 @@ class Guide:
     def __init__(self, robot: Robot, horizon: float, dt: float) -> None:
         self._robot, self._horizon, self._dt = robot, horizon, dt
         self._goal = np.zeros(robot.n)
+        self._lattices: Sequence[Lattice] = ()
         self.reset()
 
     def reset(self) -> None:
         """Forget the steps so far."""
-        self._lattices: Sequence[Lattice] = ()
-        self._now = 0.0
+        self._now = inf
 
     def pass_on(self) -> None:
         """A control period passes."""

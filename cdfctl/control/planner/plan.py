@@ -6,7 +6,7 @@ costs the time it takes and a little for passing near; any other costs more, and
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -117,3 +117,27 @@ def shift(plan: Plan, dt: float) -> None:
             kept += 1
     for s in range(kept, last):
         plan.tau[s] = 0.0
+
+
+@njit
+def unfold(plan: Plan, q: Array, dt: float, t: Array, path: Array) -> None:
+    """When a plan from q (n,) turns, into ``t`` (S+2,), and where, into ``path`` (S+2, n): NaN after its end. Its mean
+    velocity over the first ``dt`` goes into the last row."""
+    k, n, last = 0, q.shape[0], path.shape[0] - 1
+    t[0] = 0.0
+    for j in range(n):
+        path[0, j], path[last, j] = q[j], 0.0
+    for s in range(plan.tau.shape[0]):
+        tau = plan.tau[s]
+        if tau <= 0.0:
+            continue
+        used = min(tau, max(0.0, dt - t[k]))
+        k += 1
+        t[k] = t[k - 1] + tau
+        for j in range(n):
+            path[k, j] = path[k - 1, j] + plan.u[s, j] * tau
+            path[last, j] += plan.u[s, j] * (used / dt)
+    for i in range(k + 1, last):
+        t[i] = nan
+        for j in range(n):
+            path[i, j] = nan

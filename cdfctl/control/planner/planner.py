@@ -14,7 +14,7 @@ from cdfctl.control.planner.course import Course
 from cdfctl.control.planner.guide import Guide
 from cdfctl.control.planner.lattice import JOINTS
 from cdfctl.control.planner.march import KEPT, NARROW, NARROW_KEPT, Space, new_space
-from cdfctl.control.planner.plan import Aim, new_plan, shift
+from cdfctl.control.planner.plan import Aim, new_plan, shift, unfold
 from cdfctl.control.planner.random import new_stream
 from cdfctl.control.planner.search import BOOST, search
 from cdfctl.control.planner.tree import new_tree, plant, recall
@@ -181,13 +181,7 @@ class Planner:
         return guide.found, work
 
     def _found(self, q: Array) -> Found:
-        best, dt = self._best, self._dt
-        moves = best.u * best.tau[:, None]
-        used = np.minimum(best.tau, np.maximum(0.0, dt - np.cumsum(best.tau) + best.tau))
-        real = best.tau > 0.0
-        t = np.full(len(best.tau) + 1, np.nan)
-        path = np.full((len(t), len(q)), np.nan)
-        k = int(real.sum()) + 1
-        t[0], path[0] = 0.0, q
-        t[1:k], path[1:k] = np.cumsum(best.tau[real]), q + np.cumsum(moves[real], axis=0)
-        return Found(u=used @ best.u / dt, hit=float(best.value[1]), t=t, q=path)
+        rows = len(self._best.tau) + 1
+        t, path = np.empty(rows), np.empty((rows + 1, len(q)))
+        unfold(self._best, q, self._dt, t, path)
+        return Found(u=path[rows].copy(), hit=float(self._best.value[1]), t=t, q=path[:rows])
