@@ -27,7 +27,7 @@ from cdfctl.types import Array
 
 CHANGE = 0.25  # share of candidates that vary the best plan, once it is free
 TOWARD = 0.7  # share of the others that go toward a random configuration and time
-SEEK = 0.5  # the same while no plan is free
+SEEK = 0.5  # the same of every other one while no plan is free
 BOOST = 4  # times as many candidates while no plan is free
 GOOD = 1e-3  # s: nothing is sought that is better by less
 REST = 1.0  # s: how long the goal should stay free after arrival, where the task does not say
@@ -74,14 +74,15 @@ def search(
             return c
         node, count = 0, 0
         if c > 0:
+            near = not free and c % 2 == 0
             if free and uniform(stream) < CHANGE:
                 count = propose_change(aim, best, tree, stream)
             else:
                 count = 1
-                if uniform(stream) < (TOWARD if free else SEEK):
-                    node = propose_toward(aim, best, tree, stream)
+                if uniform(stream) < (SEEK if near else TOWARD):
+                    node = propose_toward(aim, best, tree, near, stream)
                 else:
-                    node = propose_random(aim, tree, free, stream)
+                    node = propose_random(aim, tree, near, stream)
             if count == 0 or node < 0:
                 continue
         _follow(arm, course, aim, best, tree, node, count, FULL, space)

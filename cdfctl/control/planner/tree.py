@@ -13,9 +13,9 @@ from cdfctl.fields.kernel.structs import Struct
 from cdfctl.types import Array, IntArray
 
 LOCAL = 0.35  # share of the random motions that start on the best plan
-STUCK = 0.6  # the same while no plan is free
+STUCK = 0.6  # the same where what makes the best plan fail is to be got over
 BETWEEN = 0.6  # share of them that start in the middle of an edge
-BEYOND = 1.0  # s: so far past the time at which the best plan fails motions are sought, while no plan is free
+BEYOND = 1.0  # s: then no motion goes farther past the time at which the best plan fails
 LONGEST = 1.5  # s: longest motion toward a random configuration
 
 
@@ -122,14 +122,14 @@ def keep(
 
 
 @njit
-def propose_random(aim: Aim, tree: Tree, free: bool, stream: Stream) -> int:
+def propose_random(aim: Aim, tree: Tree, near: bool, stream: Stream) -> int:
     """A random motion into ``move[0]``; the node it starts from, -1 for none.
 
     It starts on the best plan, or where few have started: all joints at full speed, or some of them and the others at
-    rest or on the straight way to the goal; or rest; or any speed.
+    rest or on the straight way to the goal; or rest; or any speed. ``near`` is for more on the best plan.
     """
     node = int(tree.used[1])
-    if node > 0 and uniform(stream) < (LOCAL if free else STUCK):
+    if node > 0 and uniform(stream) < (STUCK if near else LOCAL):
         for _ in range(int(uniform(stream) * tree.depth[node])):
             node = int(tree.parent[node])
     else:
@@ -160,11 +160,11 @@ def propose_random(aim: Aim, tree: Tree, free: bool, stream: Stream) -> int:
 
 
 @njit
-def propose_toward(aim: Aim, best: Plan, tree: Tree, stream: Stream) -> int:
+def propose_toward(aim: Aim, best: Plan, tree: Tree, near: bool, stream: Stream) -> int:
     """A motion toward a random configuration and time into ``move[0]``; the node it starts from, -1 for none.
 
     That is the last node from which the configuration can be reached in time, so that the tree spreads to where it has
-    not been.
+    not been. ``near`` is for times not far beyond that at which the best plan fails.
     """
     q, n = tree.work, tree.work.shape[0]
     # Few joints can be sampled in all their range; of many, most samples are taken near the straight way.
@@ -175,8 +175,7 @@ def propose_toward(aim: Aim, best: Plan, tree: Tree, stream: Stream) -> int:
         low = max(aim.low[j], min(here, aim.goal[j]) - spread)
         high = min(aim.high[j], max(here, aim.goal[j]) + spread)
         q[j] = low + (high - low) * uniform(stream)
-    # What makes the best plan fail is to be got over first.
-    t = min(aim.horizon, best.value[1] + BEYOND) * uniform(stream)
+    t = (min(aim.horizon, best.value[1] + BEYOND) if near else aim.horizon) * uniform(stream)
     if best.value[1] == inf and t + straight(aim, q, tree.move[0]) >= best.value[0]:
         return -1
     node, latest = -1, -1.0
