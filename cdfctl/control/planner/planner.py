@@ -13,7 +13,7 @@ from cdfctl.control.planner.arm import arm_of
 from cdfctl.control.planner.course import Course
 from cdfctl.control.planner.guide import Guide
 from cdfctl.control.planner.lattice import JOINTS
-from cdfctl.control.planner.march import KEPT, NARROW, NARROW_KEPT, Space, new_space
+from cdfctl.control.planner.march import FULL, KEPT, NARROW, NARROW_KEPT, Space, march, new_space
 from cdfctl.control.planner.plan import Aim, new_plan, shift, unfold
 from cdfctl.control.planner.random import new_stream
 from cdfctl.control.planner.search import BOOST, search
@@ -24,6 +24,7 @@ from cdfctl.types import Array
 SLICE = 20_000.0  # work between two looks at the clock, about 0.3 ms; none are taken without a budget
 WORK = 60.0  # a step's work, for each candidate and joint: where trying is dear, fewer are tried
 GUIDED = 4.0  # times as much for a guide, where no plan is at hand
+THREAT = 2.0  # s: the robot is under a threat where it could not rest so long
 SAVED = 0.25  # of it a step adds to what may be taken where no plan is free,
 BURST = 64.0  # up to so many times a step's
 
@@ -87,6 +88,7 @@ class Planner:
     def __init__(self, robot: Robot, settings: Settings, dt: float) -> None:
         self.robot, self._settings, self._dt = robot, settings, dt
         self._arm = arm_of(robot)
+        self._rest = np.zeros(robot.n)
         self._turn = np.where(robot.continuous, 2.0 * np.pi, 0.0)
         self._best = new_plan(settings.segments, robot.n)
         self._tree = new_tree(2 * BOOST * settings.candidates + settings.segments, settings.segments, robot.n)
@@ -128,7 +130,8 @@ class Planner:
         plant(self._tree, q)
         if self._guide is not None:
             self._guide.pass_on()
-        search, clock = self._searching(course, aim, q), _Clock(settings.budget)
+        threat, _ = march(self._arm, course, q, self._rest, 0.0, THREAT, 0.0, FULL, self._space)
+        search, clock = self._searching(course, aim, q, threat < inf), _Clock(settings.budget)
         most = settings.candidates * robot.n * WORK
         self._saved = min(self._saved + SAVED * most, BURST * most)
         grade = KEPT if self._best.value[3] < NARROW else NARROW_KEPT
@@ -156,13 +159,15 @@ class Planner:
         self._saved -= max(0.0, work - most)
         return self._found(q)
 
-    def _searching(self, course: Course, aim: Aim, q: Array) -> Callable[[int, int, int, int, float, float], int]:
+    def _searching(
+        self, course: Course, aim: Aim, q: Array, threat: bool
+    ) -> Callable[[int, int, int, int, float, float], int]:
         """The search of a step, but for the numbers that say how far it goes."""
 
         def part(first: int, given: int, grade: int, enough: int, free: float, effort: float) -> int:
             return search(
-                self._arm, course, aim, self._best, self._tree, q, first, given, grade, self._settings.candidates,
-                enough, free, effort, self._stream, self._space,
+                self._arm, course, aim, self._best, self._tree, q, first, given, grade, threat,
+                self._settings.candidates, enough, free, effort, self._stream, self._space,
             )  # fmt: skip
 
         return part

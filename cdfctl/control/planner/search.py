@@ -27,7 +27,7 @@ from cdfctl.types import Array
 
 CHANGE = 0.25  # share of candidates that vary the best plan, once it is free
 TOWARD = 0.7  # share of the others that go toward a random configuration and time
-SEEK = 0.5  # the same of every other one while no plan is free
+SEEK = 0.5  # the same under a threat, while no plan is free
 BOOST = 4  # times as many candidates while no plan is free
 GOOD = 1e-3  # s: nothing is sought that is better by less
 REST = 1.0  # s: how long the goal should stay free after arrival, where the task does not say
@@ -46,6 +46,7 @@ def search(
     first: int,
     given: int,
     grade: int,
+    threat: bool,
     candidates: int,
     enough: int,
     effort: float,
@@ -59,8 +60,9 @@ def search(
     ``search_effort`` while none is, distances have been evaluated.
 
     Candidate 0 is the straight way, the others are drawn; but first the ``given`` motions in ``tree.move`` are tried,
-    where that is not negative, and ``grade`` says how much of their margins they must keep. Returns the
-    number to go on with; ``enough`` means that all is done.
+    where that is not negative, and ``grade`` says how much of their margins they must keep. Under a
+    ``threat`` what makes the best plan fail is to be got over first. Returns the number to go on with; ``enough`` means
+    that all is done.
     """
     space.looks[0] = 0.0
     if given >= 0:
@@ -74,7 +76,7 @@ def search(
             return c
         node, count = 0, 0
         if c > 0:
-            near = not free and c % 2 == 0
+            near = threat and not free
             if free and uniform(stream) < CHANGE:
                 count = propose_change(aim, best, tree, stream)
             else:
