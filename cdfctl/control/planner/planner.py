@@ -26,7 +26,8 @@ WORK = 60.0  # a step's work, for each candidate and joint: where trying is dear
 GUIDED = 4.0  # times as much for a guide, where no plan is at hand
 THREAT = 2.0  # s: the robot is under a threat where it could not rest so long
 SAVED = 0.25  # of it a step adds to what may be taken where no plan is free,
-BURST = 64.0  # up to so many times a step's
+BURST = 16.0  # up to so many times a step's,
+GUIDED_BURST = 64.0  # or so many where there is a guide, which ends when it has proved that there is no way
 
 
 @dataclass(frozen=True)
@@ -133,7 +134,8 @@ class Planner:
         threat, _ = march(self._arm, course, q, self._rest, 0.0, THREAT, 0.0, FULL, self._space)
         search, clock = self._searching(course, aim, q, threat < inf), _Clock(settings.budget)
         most = settings.candidates * robot.n * WORK
-        self._saved = min(self._saved + SAVED * most, BURST * most)
+        burst = BURST if self._guide is None else GUIDED_BURST
+        self._saved = min(self._saved + SAVED * most, burst * most)
         grade = KEPT if self._best.value[3] < NARROW else NARROW_KEPT
         given, enough, work = recall(self._best, self._tree), BOOST * settings.candidates, 0.0
         first = 0
