@@ -26,8 +26,8 @@ WORK = 60.0  # a step's work, for each candidate and joint: where trying is dear
 GUIDED = 4.0  # times as much for a guide, where no plan is at hand
 THREAT = 2.0  # s: the robot is under a threat where it could not rest so long
 SAVED = 0.25  # of it a step adds to what may be taken where no plan is free,
-BURST = 16.0  # up to so many times a step's,
-GUIDED_BURST = 64.0  # or so many where there is a guide, which ends when it has proved that there is no way
+BURST = 64.0  # up to so many times a step's;
+CALM = 16.0  # only so many of them where there is no threat and no guide, which ends when there is proved to be no way
 
 
 @dataclass(frozen=True)
@@ -134,8 +134,8 @@ class Planner:
         threat, _ = march(self._arm, course, q, self._rest, 0.0, THREAT, 0.0, FULL, self._space)
         search, clock = self._searching(course, aim, q, threat < inf), _Clock(settings.budget)
         most = settings.candidates * robot.n * WORK
-        burst = BURST if self._guide is None else GUIDED_BURST
-        self._saved = min(self._saved + SAVED * most, burst * most)
+        self._saved = min(self._saved + SAVED * most, BURST * most)
+        kept = (BURST - CALM) * most if self._guide is None and threat == inf else 0.0
         grade = KEPT if self._best.value[3] < NARROW else NARROW_KEPT
         given, enough, work = recall(self._best, self._tree), BOOST * settings.candidates, 0.0
         first = 0
@@ -151,7 +151,7 @@ class Planner:
                 first = search(first, given, self._guide.grade, settings.candidates, 0.0, 0.0)
                 given, work, enough = -1, 0.0, settings.candidates
         # While no plan is free a step may take what those before it have saved.
-        more = most + min((BOOST - 1) * most, self._saved)
+        more = most + min((BOOST - 1) * most, max(0.0, self._saved - kept))
         while first < enough and work < (most if self._best.value[1] == inf else more):
             if clock.over():
                 break
