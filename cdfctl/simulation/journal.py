@@ -157,13 +157,16 @@ class JournalReader:
                 check_regular(live / name)
             self._file = (live / STEPS).open("rb")
         except OSError as error:
-            raise InputError(f"{live}: cannot be read: {error.strerror or error}", hint=AGAIN) from None
+            raise _unreadable(live, error) from None
         try:
             self.scenario = load_scenario(live / SCENARIO).scenario
             self._fields = _fields(self._file.readline(LONGEST))
         except ValueError as error:
             self._file.close()
             raise InputError(f"{live / STEPS}: not a run in progress of this cdfctl: {error}", hint=AGAIN) from None
+        except OSError as error:  # what opens like a file need not read like one: /proc/self/mem
+            self._file.close()
+            raise _unreadable(live, error) from None
         except InputError:
             self._file.close()
             raise
@@ -179,9 +182,13 @@ class JournalReader:
     def poll(self) -> Trajectory | None:
         """The steps that are complete by now as a trajectory; None where none has come since the last time.
 
-        It ends in the state before the newest step.
+        It ends in the state before the newest step. Raises :class:`cdfctl.errors.InputError` where the journal cannot
+        be read any more.
         """
-        self._rest += self._file.read()
+        try:
+            self._rest += self._file.read()
+        except OSError as error:
+            raise _unreadable(self._live, error) from None
         whole = len(self._rest) // (8 * self._width) * (8 * self._width)
         if not whole:
             return None
@@ -204,6 +211,10 @@ class JournalReader:
             start = end
         arrays["infeasible"] = arrays["infeasible"] != 0.0
         return trajectory_of(arrays, self._live / STEPS)
+
+
+def _unreadable(live: Path, error: OSError) -> InputError:
+    return InputError(f"{live}: cannot be read: {error.strerror or error}", hint=AGAIN)
 
 
 def _fields(line: bytes) -> list[tuple[str, tuple[int, ...]]]:

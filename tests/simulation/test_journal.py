@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -124,3 +125,18 @@ def test_another_file_is_not_taken_for_one(trial, tmp_path, header):
     (live / STEPS).write_bytes(header)
     with pytest.raises(InputError, match="not a run in progress"):
         JournalReader(live)
+
+
+@pytest.mark.skipif(not Path("/proc/self/mem").exists(), reason="there is no file here that opens and does not read")
+def test_a_file_that_opens_but_does_not_read_is_refused(trial, tmp_path):
+    folder = tmp_path / "run"
+    with journal(folder, trial.scenario, on=True) as kept:
+        for step in kept.through(trial.run()):
+            if step.index == 1:
+                steps = live_folder(folder) / STEPS
+                steps.rename(tmp_path / "kept")
+                steps.symlink_to("/proc/self/mem")
+                with pytest.raises(InputError, match="cannot be read"):
+                    JournalReader(live_folder(folder))
+                steps.unlink()
+                (tmp_path / "kept").rename(steps)
