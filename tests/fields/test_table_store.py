@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import logging
 import struct
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +23,8 @@ from cdfctl.robots.robot import Robot
 from cdfctl.types import Obstacle, Scene, Sphere
 
 from .table_helpers import small_table, write_small
+
+Change = Callable[[Any], Any]
 
 
 @pytest.fixture(scope="module")
@@ -130,11 +134,23 @@ def test_no_table_is_a_missing_thing(planar: Robot, tmp_path: Path) -> None:
     assert caught.value.exit_status == 3
 
 
-@pytest.mark.parametrize("name", ["piece", "first", "q"])
-def test_arrays_that_do_not_fit_never_reach_compiled_code(planar: Robot, path: Path, name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("piece", lambda piece: piece + np.int16(9)),
+        ("piece", lambda piece: piece[:, None]),
+        ("piece", lambda piece: piece[:0].reshape(0, 1)),
+        ("first", lambda first: first[::-1].copy()),
+        ("first", lambda first: first[None]),
+        ("q", lambda q: q[1:]),
+        ("origin", lambda origin: origin[:, None]),
+        ("shape", lambda shape: shape[None]),
+        ("spacing", lambda spacing: -spacing),
+    ],
+)
+def test_arrays_that_do_not_fit_never_reach_compiled_code(planar: Robot, path: Path, name: str, change: Change) -> None:
     arrays, metadata = read_file(path)
-    changed = {"piece": arrays["piece"] + np.int16(9), "first": arrays["first"][::-1].copy(), "q": arrays["q"][1:]}
-    write_file(path, {**arrays, name: changed[name]}, metadata)
+    write_file(path, {**arrays, name: change(arrays[name])}, metadata)
     with pytest.raises(InputError, match="do not fit together"):
         load_table(path, planar)
 

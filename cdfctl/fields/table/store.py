@@ -184,13 +184,14 @@ def _stored(path: Path, arrays: dict[str, NDArray[Any]], metadata: dict[str, str
 
 def _check_arrays(path: Path, table: Table, robot: Robot, again: str) -> None:
     """What compiled code relies on, which checks no index."""
-    entries = len(table.piece)
+    entries = table.piece.size
     kinds = {"origin": "f8", "shape": "i8", "first": "i8", "piece": "i2", "q": "f4"}
     good = (
         all(getattr(table, name).dtype == kind for name, kind in kinds.items())
         and table.origin.shape == table.shape.shape == (3,)
         and bool(np.all(table.shape > 0))
         and table.first.shape == (math.prod(table.shape.tolist()) + 1,)  # in whole numbers, which do not run over
+        and table.piece.shape == (entries,)
         and table.q.shape == (entries, robot.n)
         and table.first[0] == 0
         and table.first[-1] == entries
