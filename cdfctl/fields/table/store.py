@@ -173,7 +173,7 @@ def _stored(path: Path, arrays: dict[str, NDArray[Any]], metadata: dict[str, str
     arrays = dict(arrays)
     return StoredTable(
         path=path,
-        table=Table(spacing=float(arrays.pop("spacing")[0]), **arrays),
+        table=Table(spacing=float(arrays.pop("spacing").item()), **arrays),
         robot=metadata["robot"],
         robot_hash=metadata["robot_hash"],
         parameters=BuildParameters(**parse_json(metadata["parameters"])),
