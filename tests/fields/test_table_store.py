@@ -153,7 +153,7 @@ def test_no_table_is_a_missing_thing(planar: Robot, tmp_path: Path) -> None:
 def test_arrays_that_do_not_fit_never_reach_compiled_code(planar: Robot, path: Path, name: str, change: Change) -> None:
     arrays, metadata = read_file(path)
     write_file(path, {**arrays, name: change(arrays[name])}, metadata)
-    with pytest.raises(InputError, match="do not fit together|not a table of cdfctl"):
+    with pytest.raises(InputError, match=r"do not fit together|not a table of cdfctl"):
         load_table(path, planar)
 
 
