@@ -3,6 +3,7 @@
 import atexit
 import os
 import shutil
+import signal
 import tempfile
 from pathlib import Path
 
@@ -28,3 +29,8 @@ def _lend_kernels() -> None:
 
 
 _lend_kernels()
+
+# A shell starts what it puts into the background with SIGINT ignored, and children inherit that: the commands that the
+# tests interrupt would go on.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
