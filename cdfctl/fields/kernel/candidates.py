@@ -28,7 +28,7 @@ class Candidates(Struct):
         slope: (c,) norm of g over the joints not at a limit.
         multiplier: (c,) λ, and ``residual`` (c,) the norm of z (c, n) = x - q + λ g over the joints free to move.
         part: (c,) the part of the obstacle that is nearest.
-        corners: (c,) how many corners of the cores carry the nearest points, 0 where the cores touch; ``corner_a``,
+        corners: (c,) how many corners of the cores carry the nearest points, 0 where D is flat; ``corner_a``,
             ``corner_b`` (c, 4, 3) which ones, in the frame of the piece.
         cost: (c,) rad: the distance from q, and the linearised distance still to go to the surface.
         frames: where the joints are, in the ``place`` (c,) of each candidate: its own, or the last, the joints at q.

@@ -42,7 +42,7 @@ from cdfctl.types import Array, IntArray
 
 class Carrier(Struct):
     """The corners of two cores that carry their nearest points: ``a``, ``b`` (4, 3) in the frame of the first core, how
-    many there are, ``size`` (1,), 0 for cores that touch; and the ``part`` (1,) of the obstacles."""
+    many there are, ``size`` (1,), 0 where touching cores have a flat difference; the ``part`` (1,) of the obstacles."""
 
     a: Array
     b: Array
