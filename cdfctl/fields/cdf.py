@@ -107,7 +107,7 @@ class CDF:
             self._memory = new_memory(len(names), old.piece.shape[1], self.robot.n, old.tried.shape[1])
             for i, name in enumerate(names):
                 if name in places:
-                    for member in ("known", "piece", "x", "motion", "steady", "tried", "pose"):
+                    for member in ("known", "piece", "x", "motion", "steady", "tried", "drift", "pose"):
                         getattr(self._memory, member)[i] = getattr(old, member)[places[name]]
             self._memory.turn[:], self._memory.q[:] = old.turn, old.q
         self._names = names

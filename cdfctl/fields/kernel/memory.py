@@ -13,7 +13,9 @@ from cdfctl.types import Array, BoolArray, IntArray
 
 UNKNOWN, NOTHING = 0, -1  # in a memory: nothing is known of an obstacle; no contact was found
 STEADY = 0.5  # share of a contact's motion by which the motion before may differ, if it is to go on like that
+NONE, ALL = -2, -1  # of the kinds of starts, which count from 0
 LEAP = 0.05  # m, or rad of a joint, between two queries: an obstacle that moved so far is searched widely
+DRIFT = 0.15  # m, or rad, since its last turn: one that moved so far is searched from all kinds of starts at its turn
 
 
 class Memory(Struct):
@@ -29,6 +31,7 @@ class Memory(Struct):
             was, or has one.
         turn: (1,) counts the queries: it is the turn of obstacle ``turn % m``.
         leapt: (m,) not 0 where obstacle or robot moved by more than :data:`LEAP` since the last query.
+        drift: (m,) how far obstacle and robot have moved since its last turn, query by query, m or rad of a joint.
         q, pose: (n,), (m, 7) of the last query.
         before, moved: (w, n) workspace of :func:`keep`; ``start`` (n,) that of :func:`expect`.
     """
@@ -41,6 +44,7 @@ class Memory(Struct):
     tried: Array
     turn: IntArray
     leapt: IntArray
+    drift: Array
     q: Array
     pose: Array
     before: Array
@@ -59,6 +63,7 @@ def new_memory(m: int, w: int, n: int, k: int) -> Memory:
         np.full((m, k), np.inf),
         np.zeros(1, dtype=np.int64),
         np.zeros(m, dtype=np.int64),
+        np.zeros(m),
         np.zeros(n),
         np.zeros((m, 7)),
         np.zeros((w, n)),
@@ -82,6 +87,20 @@ def begin_query(memory: Memory, q: Array, parts: Parts) -> None:
             moved = max(moved, abs(parts.pose[o, j] - memory.pose[o, j]))
             memory.pose[o, j] = parts.pose[o, j]
         memory.leapt[o] = 1 if moved > LEAP and not first else 0
+        memory.drift[o] = 0.0 if first else memory.drift[o] + moved
+
+
+@njit
+def kind_now(memory: Memory, o: int, kinds: int) -> int:
+    """Which kind of starts, of so many, obstacle o is to be searched from in this query: :data:`ALL` where nothing is
+    known, after a leap, and at its turn if much has moved since the last one; else at its turn the next kind, and
+    :data:`NONE` before."""
+    m = memory.known.shape[0]
+    turn = memory.turn[0] % m == o
+    whole = memory.known[o] == UNKNOWN or memory.leapt[o] != 0 or (turn and memory.drift[o] > DRIFT)
+    if turn or whole:
+        memory.drift[o] = 0.0
+    return ALL if whole else (memory.turn[0] // m) % kinds if turn else NONE
 
 
 @njit
