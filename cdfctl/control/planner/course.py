@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import sqrt
+from math import cos, sin, sqrt
 
 from cdfctl.control.planner.jit import njit_inline
 from cdfctl.fields.kernel.body import turn
@@ -61,5 +61,5 @@ def pose_at(knot: Array, rotation: Array, position: Array, twist: Array, o: int,
     wx, wy, wz = twist[o, k, 3], twist[o, k, 4], twist[o, k, 5]
     speed = sqrt(wx * wx + wy * wy + wz * wz)
     if speed > 0.0:
-        r = compose(turn((wx / speed, wy / speed, wz / speed), speed * s), r)
+        r = compose(turn((wx / speed, wy / speed, wz / speed), sin(speed * s), cos(speed * s)), r)
     return r, p

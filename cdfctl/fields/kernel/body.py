@@ -10,10 +10,10 @@ of a body the joint moves, the joint's column of the Jacobian at p is
 from __future__ import annotations
 
 from functools import lru_cache
-from math import cos, sin
 
 import numpy as np
 
+from cdfctl.fields.kernel.angles import padded, sines_and_cosines
 from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.sets import ConvexSets, pack
 from cdfctl.fields.kernel.structs import Struct
@@ -63,11 +63,15 @@ class Frames(Struct):
     Attributes:
         rotation, translation: (c, n, 3, 3), (c, n, 3) placement of joint i, its own motion included.
         axis: (c, n, 3) axis of joint i.
+        angle, sine, cosine: what :mod:`.angles` needs to turn the joints.
     """
 
     rotation: Array
     translation: Array
     axis: Array
+    angle: Array
+    sine: Array
+    cosine: Array
 
 
 @lru_cache(maxsize=8)
@@ -90,12 +94,21 @@ def body_of(robot: Robot) -> Body:
 def new_frames(body: Body, c: int = 1) -> Frames:
     """An empty workspace for ``c`` configurations."""
     n = len(body.chain.parent)
-    return Frames(np.zeros((c, n, 3, 3)), np.zeros((c, n, 3)), np.zeros((c, n, 3)))
+    wide = padded(n)
+    return Frames(
+        np.zeros((c, n, 3, 3)),
+        np.zeros((c, n, 3)),
+        np.zeros((c, n, 3)),
+        np.zeros(wide),
+        np.zeros(wide),
+        np.zeros(wide),
+    )
 
 
 @njit
 def forward(body: Body, q: Array, frames: Frames, c: int) -> None:
     """All joints at q (n,), which is configuration c of ``frames``."""
+    sines_and_cosines(q, frames.angle, frames.sine, frames.cosine)
     for i in range(q.shape[0]):
         _place_joint(body, q, frames, c, i)
 
@@ -103,6 +116,7 @@ def forward(body: Body, q: Array, frames: Frames, c: int) -> None:
 @njit
 def forward_to(body: Body, q: Array, joint: int, frames: Frames, c: int) -> None:
     """``joint`` at q (n,), and the joints between it and the base; the others keep what they had."""
+    sines_and_cosines(q, frames.angle, frames.sine, frames.cosine)
     for i in range(joint + 1):
         if body.chain.moves[i, joint]:
             _place_joint(body, q, frames, c, i)
@@ -122,18 +136,17 @@ def _place_joint(body: Body, q: Array, frames: Frames, c: int, i: int) -> None:
     if chain.prismatic[i]:
         t = add(t, scale(q[i], z))
     elif axis[2] == 1.0:
-        r = turn_about_z(r, q[i])
+        r = turn_about_z(r, frames.sine[i], frames.cosine[i])
     else:
-        r = compose(r, turn(axis, q[i]))
+        r = compose(r, turn(axis, frames.sine[i], frames.cosine[i]))
     store_rot(frames.rotation[c], i, r)
     store(frames.translation[c], i, t)
     store(frames.axis[c], i, z)
 
 
 @njit
-def turn_about_z(r: Rot, angle: float) -> Rot:
-    """R times the rotation by ``angle`` about z, the axis of most joints."""
-    s, c = sin(angle), cos(angle)
+def turn_about_z(r: Rot, s: float, c: float) -> Rot:
+    """R times the rotation about z, the axis of most joints, by the angle of sine ``s`` and cosine ``c``."""
     x, y, z = r
     return (
         (c * x[0] + s * x[1], c * x[1] - s * x[0], x[2]),
@@ -143,9 +156,9 @@ def turn_about_z(r: Rot, angle: float) -> Rot:
 
 
 @njit
-def turn(k: Vec, angle: float) -> Rot:
-    """Rotation by ``angle`` about the unit vector k (Rodrigues): 1 + sin [k] + (1 - cos) [k]²."""
-    s, c = sin(angle), 1.0 - cos(angle)
+def turn(k: Vec, s: float, cosine: float) -> Rot:
+    """Rotation about the unit vector k by the angle of sine ``s`` (Rodrigues): 1 + sin [k] + (1 - cos) [k]²."""
+    c = 1.0 - cosine
     x, y, z = k
     return (
         (1.0 - c * (y * y + z * z), c * x * y - s * z, c * x * z + s * y),
