@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,15 +36,6 @@ if TYPE_CHECKING:
 FIELDS_OF: Mapping[FieldKind, tuple[str, ...]] = {"sdf": ("sdf",), "cdf": ("cdf",), "dual": ("cdf", "sdf")}
 
 
-@dataclass(frozen=True)
-class RowSource:
-    """One field and what is made of its answer: ``ask`` gives the rows' distances, ``rows`` the constraints."""
-
-    field: Field
-    ask: Callable[[Array, Scene], FieldQuery]
-    rows: Callable[[FieldQuery], Rows]
-
-
 class Core:
     """Velocities that keep a robot clear of a moving scene, as near as can be to those asked for.
 
@@ -62,9 +53,9 @@ class Core:
                 raise InputError(f"{name} must be one number or {n}, one a joint, found {len(weight)}")
         self.robot, self.variant, self.parameters, self.dt = robot, variant, parameters, dt
         p = parameters
-        self._sources: Sequence[RowSource] = [
-            _source(name, robot, variant, parameters, dt) for name in FIELDS_OF[variant.field]
-        ]
+        self._fields = [make_field(name, robot) for name in FIELDS_OF[variant.field]]
+        self._at_once = _at_once(self._fields)
+        self._rows = _rows_of(variant, parameters, dt)
         self._qp = StepQP(
             n,
             effort_weight=parameters.effort_weight,
@@ -82,8 +73,8 @@ class Core:
     def reset(self) -> None:
         """Forget the steps so far; the robot stands."""
         self.u_last = np.zeros(self.robot.n)
-        for source in self._sources:
-            source.field.reset()
+        for field in self._fields:
+            field.reset()
         if self._own is not None:
             self._own.reset()
 
@@ -93,7 +84,7 @@ class Core:
         Only what a plan knows nothing of may change it: acceleration limits, velocity limits that fall towards the end
         stops, and the robot's own links.
         """
-        h = least_barrier(self._sources[0].ask(q, scene), len(scene), self.parameters.margin)
+        h = least_barrier(self._ask(self._fields[0], q, scene), len(scene), self.parameters.margin)
         if self._accelerates_freely and self.robot.braking is None and self._own is None:
             self.u_last = u.copy()
             return Decision(u=u, h=h, slack=float("nan"), status="optimal", infeasible=False, residual=0.0)
@@ -110,22 +101,32 @@ class Core:
         """
         p = self.parameters
         try:
-            answers = [source.ask(q, scene) for source in self._sources]
+            answers = self._answers(q, scene)
         except InputError:
             check_scene(scene)  # which says more than a field, that does not know the obstacles' names
             raise
-        parts = [source.rows(a) for source, a in zip(self._sources, answers, strict=True)]
-        if task is not None:
-            parts.append(task)
+        rows = self._rows(answers)
         h = least_barrier(answers[0], len(scene), p.margin)
-        return self._decide(q, scene, u_ref, h, answers, parts)
+        return self._decide(q, scene, u_ref, h, answers, [rows] if task is None else [rows, task])
+
+    def _answers(self, q: Array, scene: Scene) -> Sequence[FieldQuery]:
+        """What each field says, the one whose barrier is reported as h first."""
+        if self._at_once is not None:
+            p = self.parameters
+            return self._at_once(q, scene, sheets=p.sheets, every_link=p.links == "all")
+        return [self._ask(field, q, scene) for field in self._fields]
+
+    def _ask(self, field: Field, q: Array, scene: Scene) -> FieldQuery:
+        p = self.parameters
+        several = p.links == "all" if field.unit == "m" else p.sheets > 1
+        return field.contacts(q, scene, sheets=p.sheets) if several else field.query(q, scene)
 
     def _decide(
         self, q: Array, scene: Scene, u_ref: Array, h: Array, answers: Sequence[FieldQuery], parts: Sequence[Rows]
     ) -> Decision:
         """The command nearest to ``u_ref`` within the box, under ``parts`` and the rows of the robot's own links.
 
-        ``parts`` begin with those of ``answers``, in order.
+        ``parts`` begin with those of ``answers``, one after the other.
         """
         p, m = self.parameters, len(scene)
         near = self._own.query(q) if self._own is not None else None
@@ -133,7 +134,7 @@ class Core:
         low, high = self._box(q)
         command = self._qp.solve(u_ref, self.u_last, stack([*own, *parts], self.robot.n), low, high)
         self.u_last = command.u.copy()  # the caller may change the one it gets
-        holders = self._holders(command.tight, near, answers, parts, scene)
+        holders = self._holders(command.tight, near, answers, scene)
         return Decision(
             u=command.u,
             h=h,
@@ -170,10 +171,9 @@ class Core:
         tight: IntArray,
         near: SelfQuery | None,
         answers: Sequence[FieldQuery],
-        parts: Sequence[Rows],
         scene: Scene,
     ) -> Iterable[str]:
-        """The rows ``tight`` in words, each once; the task's are left out. ``parts`` are as in :meth:`_decide`."""
+        """The rows ``tight`` in words, each once; the task's are left out."""
         found: dict[str, None] = {}
         rows = tight.tolist()  # few, in ascending order
         if not rows:
@@ -184,15 +184,13 @@ class Core:
                 if row < len(pairs):
                     found[" near ".join(self._own.links[pairs[row]])] = None
             rows = [row - len(pairs) for row in rows if row >= len(pairs)]
-        for answer, part in zip(answers, parts, strict=False):  # the task's rows come last
-            count = len(part.rhs)
-            if rows and rows[0] < count:
-                used = np.flatnonzero(usable(answer))
-                for row in rows:
-                    if row < count:
-                        name, link = scene.names[answer.obstacle[used[row]]], answer.link[used[row]]
-                        found[f"{name} near {self.robot.links[link]}"] = None
-            rows = [row - count for row in rows if row >= count]
+        for answer in answers:  # the task's rows come last
+            used = np.flatnonzero(usable(answer))
+            for row in rows:
+                if row < len(used):
+                    name, link = scene.names[answer.obstacle[used[row]]], answer.link[used[row]]
+                    found[f"{name} near {self.robot.links[link]}"] = None
+            rows = [row - len(used) for row in rows if row >= len(used)]
         return found
 
     def _bounds(self, u: Array, u_ref: Array, low: Array, high: Array) -> Iterable[str]:
@@ -222,23 +220,27 @@ def core_of(
     return Core(robot, variant, parameters, dt)
 
 
-def _source(field_name: str, robot: Robot, variant: Variant, p: Parameters, dt: float) -> RowSource:
-    field = make_field(field_name, robot)
-    several = p.links == "all" if field_name == "sdf" else p.sheets > 1
+def _at_once(fields: Sequence[Field]) -> Callable[..., tuple[FieldQuery, FieldQuery]] | None:
+    """What asks both ``fields`` in one pass, where they are a CDF and an SDF; None elsewhere."""
+    if [field.unit for field in fields] != ["rad", "m"]:
+        return None
+    from cdfctl.fields.cdf import CDF  # compiled code, which the fields have loaded, if these are they
+    from cdfctl.fields.sdf import SDF
 
-    def ask(q: Array, scene: Scene) -> FieldQuery:
-        return field.contacts(q, scene, sheets=p.sheets) if several else field.query(q, scene)
+    cdf, sdf = fields
+    return partial(cdf.beside, sdf) if isinstance(cdf, CDF) and isinstance(sdf, SDF) else None
 
-    def rows(query: FieldQuery) -> Rows:
-        match variant.safety:
-            case "tvcbf":
-                return tvcbf_rows(query, p.alpha, p.margin)
-            case "cbf":
-                return cbf_rows(query, p.alpha, p.margin)
-            case "hyperplane":
-                return hyperplane_rows(query, p.hyperplane_offset, dt)
 
-    return RowSource(field, ask, rows)
+def _rows_of(variant: Variant, p: Parameters, dt: float) -> Callable[[Sequence[FieldQuery]], Rows]:
+    """What is made of the fields' answers, in their order."""
+    match variant.safety:
+        case "tvcbf":
+            return lambda answers: tvcbf_rows(answers, p.alpha, p.margin)
+        case "cbf":
+            return lambda answers: cbf_rows(answers, p.alpha, p.margin)
+        case "hyperplane":
+            offset = p.hyperplane_offset
+            return lambda answers: stack([hyperplane_rows(one, offset, dt) for one in answers], answers[0].dq.shape[1])
 
 
 def check_scene(scene: Scene) -> None:

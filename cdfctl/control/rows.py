@@ -22,22 +22,22 @@ def usable(query: FieldQuery) -> BoolArray:
     return mask
 
 
-def tvcbf_rows(query: FieldQuery, alpha: float, margin: float) -> Rows:
+def tvcbf_rows(query: FieldQuery | Sequence[FieldQuery], alpha: float, margin: float) -> Rows:
     """Time-varying control barrier function: the barrier may fall no faster than ``alpha h``, obstacle motion included.
 
         grad h . u + dh/dt >= -alpha h      that is      -grad h . u <= alpha h + dh/dt,      h = d - margin
 
     Args:
-        query: r rows of a field, in m or rad.
+        query: rows of a field, in m or rad, or of several fields, whose rows follow each other.
         alpha: class-K gain, 1/s.
-        margin: epsilon_cbf, in the unit of the field.
+        margin: epsilon_cbf, in the unit of the field (of each of several).
 
     Source: the paper's TVCBF condition for the single integrator.
     """
     return _barrier_rows(query, alpha, margin, 1.0)
 
 
-def cbf_rows(query: FieldQuery, alpha: float, margin: float) -> Rows:
+def cbf_rows(query: FieldQuery | Sequence[FieldQuery], alpha: float, margin: float) -> Rows:
     """Control barrier function that takes the scene as frozen (no time term), the paper's baseline.
 
         grad h . u >= -alpha h      that is      -grad h . u <= alpha h,      h = d - margin
@@ -206,18 +206,30 @@ def stack(parts: Sequence[Rows], n: int) -> Rows:
     )
 
 
-def _barrier_rows(query: FieldQuery, alpha: float, margin: float, motion: float) -> Rows:
+def _barrier_rows(query: FieldQuery | Sequence[FieldQuery], alpha: float, margin: float, motion: float) -> Rows:
     """Rows -grad h . u <= alpha h + motion dh/dt of those that are :func:`usable`."""
-    G, rhs = np.empty_like(query.dq), np.empty_like(query.d)
-    k = _fill_barriers(query.d, query.dq, query.dt, query.valid, alpha, margin, motion, G, rhs)
+    queries = (query,) if isinstance(query, FieldQuery) else query
+    most, k = sum([len(one.d) for one in queries]), 0
+    G, rhs = np.empty((most, queries[0].dq.shape[1])), np.empty(most)
+    for one in queries:
+        k = _fill_barriers(one.d, one.dq, one.dt, one.valid, alpha, margin, motion, G, rhs, k)
     return _soft_rows(G[:k], rhs[:k])
 
 
 @njit
 def _fill_barriers(
-    d: Array, dq: Array, dt: Array, valid: BoolArray, alpha: float, margin: float, motion: float, G: Array, rhs: Array
+    d: Array,
+    dq: Array,
+    dt: Array,
+    valid: BoolArray,
+    alpha: float,
+    margin: float,
+    motion: float,
+    G: Array,
+    rhs: Array,
+    k: int,
 ) -> int:
-    k = 0
+    """Rows k and after of ``G`` and ``rhs``; how many are filled then."""
     for row in range(d.shape[0]):
         if valid[row] and isfinite(d[row]):
             rhs[k] = alpha * (d[row] - margin) + motion * dt[row]

@@ -25,9 +25,11 @@ from cdfctl.fields.kernel.body import body_of
 from cdfctl.fields.kernel.cdf_rows import Workspace, contact_rows, new_contact_rows, new_workspace
 from cdfctl.fields.kernel.memory import UNKNOWN, Memory, new_memory
 from cdfctl.fields.kernel.parts import SceneParts
+from cdfctl.fields.kernel.rows import Answer, new_answer
 from cdfctl.fields.kernel.starts import Table, empty_table
+from cdfctl.fields.sdf import SDF
 from cdfctl.robots.robot import Robot
-from cdfctl.types import FieldQuery, Scene, Unit, as_vector
+from cdfctl.types import Array, FieldQuery, Scene, Unit, as_vector
 
 SPARE_MEMORY = 2  # contacts remembered beyond the sheets of the last query
 MOST_SHEETS = 16
@@ -49,6 +51,7 @@ class CDF:
         self._table = empty_table(robot.n) if table is None else table
         self._parts = SceneParts()
         self._room, self._rows = (0, 1), new_contact_rows(0, 1, robot.n)
+        self._no_distances = new_answer(0, robot.n)
         self._names: tuple[str, ...] = ()
         self._memory = new_memory(0, MOST_SHEETS + SPARE_MEMORY, robot.n, len(self._body.joint))
 
@@ -63,7 +66,7 @@ class CDF:
         Raises:
             InputError: ``q`` has not n numbers, or a number of ``q`` or of the scene is not finite.
         """
-        return self._query(q, scene, 1, every_obstacle=True)
+        return self._query(as_vector(q, self.robot.n, "q"), scene, 1, True, self._no_distances)[0]
 
     def contacts(self, q: ArrayLike, scene: Scene, *, sheets: int = 1) -> FieldQuery:
         """Up to ``sheets`` distinct contacts of each obstacle, nearest first; no row for an obstacle out of reach.
@@ -73,23 +76,45 @@ class CDF:
         Raises:
             InputError: as :meth:`query`, or ``sheets`` is not 1 … 16.
         """
-        if not 1 <= sheets <= MOST_SHEETS:
-            raise InputError(f"sheets must be 1 to {MOST_SHEETS}, found {sheets}")
-        return self._query(q, scene, sheets, every_obstacle=False)
+        return self._query(as_vector(q, self.robot.n, "q"), scene, sheets, False, self._no_distances)[0]
+
+    def beside(
+        self, sdf: SDF, q: ArrayLike, scene: Scene, *, sheets: int, every_link: bool
+    ) -> tuple[FieldQuery, FieldQuery]:
+        """The answers of both fields in one pass: signed distances at q are where the search for contacts begins.
+
+        Of this field as :meth:`contacts`, or, where ``sheets`` is 1, as :meth:`query`; of ``sdf``, which must be of the
+        same robot, as its ``per_link`` or ``query``.
+
+        Raises:
+            InputError: as those.
+        """
+        point = as_vector(q, self.robot.n, "q")
+        distances = sdf.room(len(scene), every_link=every_link)
+        rows, inside = self._query(point, scene, sheets, sheets == 1, distances)
+        if inside:
+            return rows, sdf.rows(len(scene))
+        return rows, sdf.per_link(point, scene) if every_link else sdf.query(point, scene)
 
     def reset(self) -> None:
         """Forget the contacts of earlier queries."""
         self._memory.known[:], self._memory.turn[:] = UNKNOWN, 0
 
-    def _query(self, q: ArrayLike, scene: Scene, sheets: int, *, every_obstacle: bool) -> FieldQuery:
-        point, parts = as_vector(q, self.robot.n, "q"), self._parts.of(scene)
-        room = (len(scene), sheets)
+    def _query(
+        self, q: Array, scene: Scene, sheets: int, every_obstacle: bool, distances: Answer
+    ) -> tuple[FieldQuery, bool]:
+        """The rows, and whether ``distances`` are filled."""
+        if not 1 <= sheets <= MOST_SHEETS:
+            raise InputError(f"sheets must be 1 to {MOST_SHEETS}, found {sheets}")
+        parts, room = self._parts.of(scene), (len(scene), sheets)
         if self._room != room:
             self._rows, self._room = new_contact_rows(*room, self.robot.n), room
         rows, memory = self._rows, self._remember(scene.names)
-        contact_rows(self._body, point, parts, memory, self._table, sheets, every_obstacle, rows, self._work)
+        inside = contact_rows(
+            self._body, q, parts, memory, self._table, sheets, every_obstacle, rows, distances, self._work
+        )
         count = rows.count[0]
-        return FieldQuery(
+        answer = FieldQuery(
             obstacle=rows.obstacle[:count].copy(),
             link=rows.link[:count].copy(),
             d=rows.d[:count].copy(),
@@ -99,6 +124,7 @@ class CDF:
             contact_q=rows.contact_q[:count].copy(),
             unit="rad",
         )
+        return answer, inside
 
     def _remember(self, names: tuple[str, ...]) -> Memory:
         """The memory in the order of ``names``: that of obstacles no longer there is dropped."""

@@ -20,7 +20,7 @@ from cdfctl.fields.kernel.distance import Work, new_work
 from cdfctl.fields.kernel.parts import SceneParts
 from cdfctl.fields.kernel.rows import Answer, link_rows, nearest_rows, new_answer
 from cdfctl.robots.robot import Robot
-from cdfctl.types import Array, FieldQuery, IntArray, Scene, Unit, as_vector
+from cdfctl.types import Array, FieldQuery, Scene, Unit, as_vector
 
 
 class SDF:
@@ -50,9 +50,9 @@ class SDF:
             InputError: ``q`` has not n numbers, or a number of ``q`` or of the scene is not finite.
         """
         point, parts = as_vector(q, self.robot.n, "q"), self._parts.of(scene)
-        answer = self._room(len(scene))
+        answer = self.room(len(scene), every_link=False)
         nearest_rows(self._body, point, parts, self._frames, self._work, answer)
-        return _rows(answer, np.arange(len(scene), dtype=np.int64), self._nowhere)
+        return self.rows(len(scene))
 
     def per_link(self, q: ArrayLike, scene: Scene) -> FieldQuery:
         """One row for every obstacle and link: all links of the first obstacle, in the robot's order, then the next.
@@ -61,10 +61,9 @@ class SDF:
             InputError: as :meth:`query`.
         """
         point, parts = as_vector(q, self.robot.n, "q"), self._parts.of(scene)
-        links = len(self.robot.links)
-        answer = self._room(len(scene) * links)
+        answer = self.room(len(scene), every_link=True)
         link_rows(self._body, point, parts, self._frames, self._work, answer)
-        return _rows(answer, np.arange(len(scene) * links, dtype=np.int64) // links, self._nowhere)
+        return self.rows(len(scene))
 
     def contacts(self, q: ArrayLike, scene: Scene, *, sheets: int = 1) -> FieldQuery:
         """The same as :meth:`per_link`: a link's signed distance has one contact, whatever ``sheets`` allows."""
@@ -73,10 +72,27 @@ class SDF:
     def reset(self) -> None:
         """Nothing to forget: an answer depends on its question only."""
 
-    def _room(self, r: int) -> Answer:
+    def room(self, m: int, *, every_link: bool) -> Answer:
+        """What the kernel is to fill for m obstacles, one row each or one for each and every link."""
+        r = m * len(self.robot.links) if every_link else m
         if len(self._answer.d) != r:
             self._answer, self._nowhere = new_answer(r, self.robot.n), _nowhere(r, self.robot.n)
         return self._answer
+
+    def rows(self, m: int) -> FieldQuery:
+        """The rows of m obstacles that the kernel has filled."""
+        answer = self._answer
+        each = len(answer.d) // max(m, 1)
+        return FieldQuery(
+            obstacle=np.arange(m * each, dtype=np.int64) // max(each, 1),
+            link=answer.link.copy(),
+            d=answer.d.copy(),
+            dq=answer.dq.copy(),
+            dt=answer.dt.copy(),
+            valid=answer.valid.copy(),
+            contact_q=self._nowhere,
+            unit="m",
+        )
 
 
 def _nowhere(r: int, n: int) -> Array:
@@ -84,16 +100,3 @@ def _nowhere(r: int, n: int) -> Array:
     contact_q = np.full((r, n), np.nan)
     contact_q.flags.writeable = False
     return contact_q
-
-
-def _rows(answer: Answer, obstacle: IntArray, contact_q: Array) -> FieldQuery:
-    return FieldQuery(
-        obstacle=obstacle,
-        link=answer.link.copy(),
-        d=answer.d.copy(),
-        dq=answer.dq.copy(),
-        dt=answer.dt.copy(),
-        valid=answer.valid.copy(),
-        contact_q=contact_q,
-        unit="m",
-    )

@@ -23,7 +23,8 @@ from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.joints import copy
 from cdfctl.fields.kernel.memory import Memory, begin_query
 from cdfctl.fields.kernel.parts import Parts, obstacle_pose, time_derivative
-from cdfctl.fields.kernel.pieces import pieces_at, place_at
+from cdfctl.fields.kernel.pieces import distance_rows, pieces_at, place_at
+from cdfctl.fields.kernel.rows import Answer
 from cdfctl.fields.kernel.search import Search, nearest_contacts, new_search
 from cdfctl.fields.kernel.starts import Table, table_starts
 from cdfctl.fields.kernel.structs import Struct
@@ -93,9 +94,11 @@ def contact_rows(
     sheets: int,
     every_obstacle: bool,
     rows: ContactRows,
+    distances: Answer,
     work: Workspace,
-) -> None:
-    """Fill ``rows`` for all obstacles at q (n,).
+) -> bool:
+    """Fill ``rows`` for all obstacles at q (n,); and ``distances``, unless q is outside the limits, which the answer
+    says: it has none, one or one a link for each obstacle (:func:`cdfctl.fields.kernel.pieces.distance_rows`).
 
     If ``every_obstacle``, one without a contact has a row too, which says so: d = +inf, or -inf in a penetration
     without a way out, and not valid.
@@ -103,23 +106,27 @@ def contact_rows(
     begin_query(memory, q, parts)
     finisher, pieces = work.search.finisher, work.search.pieces
     found = finisher.found
-    place_at(body, q, finisher.scratch.y, found)
+    inside = place_at(body, q, finisher.scratch.y, found)
     count = 0
     for o in range(parts.first.shape[0] - 1):
-        nearest = pieces_at(body, q, parts, o, found, pieces, finisher.work)
-        rows.f[o] = found.f[nearest]
-        centre, size = _ball_around(parts, o, vec(found.b, nearest))
-        if found.f[nearest] < 0.0:
-            filled = _escape_row(body, q, parts, o, memory, table, centre, rows, count, work)
-        else:
-            filled = nearest_contacts(body, q, parts, o, memory, table, centre, size, sheets, work.search)
-            for i in range(filled):
-                _fill(body, q, parts, o, found, finisher.choice.chosen[i], rows, count + i)
+        nearest, filled = pieces_at(body, q, parts, o, found, pieces, finisher.work), 0
+        rows.f[o] = found.f[nearest] if nearest >= 0 else np.inf
+        if inside:
+            distance_rows(body, q, parts, o, found, pieces, distances, finisher.work)
+        if nearest >= 0:
+            centre, size = _ball_around(parts, o, vec(found.b, nearest))
+            if rows.f[o] < 0.0:
+                filled = _escape_row(body, q, parts, o, memory, table, centre, rows, count, work)
+            else:
+                filled = nearest_contacts(body, q, parts, o, memory, table, centre, size, sheets, work.search)
+                for i in range(filled):
+                    _fill(body, q, parts, o, found, finisher.choice.chosen[i], rows, count + i)
         if filled == 0 and every_obstacle:
-            _say_none(rows, o, count, -np.inf if found.f[nearest] < 0.0 else np.inf)
+            _say_none(rows, o, count, -np.inf if rows.f[o] < 0.0 else np.inf)
             filled = 1
         count += filled
     rows.count[0] = count
+    return inside
 
 
 @njit

@@ -14,9 +14,12 @@ from cdfctl.fields.kernel.candidates import Candidates
 from cdfctl.fields.kernel.contact import evaluate_placed
 from cdfctl.fields.kernel.distance import Work, block_bound, relative_pose
 from cdfctl.fields.kernel.jit import njit
+from cdfctl.fields.kernel.joints import copy
 from cdfctl.fields.kernel.memory import Memory
 from cdfctl.fields.kernel.parts import Parts
+from cdfctl.fields.kernel.rows import Answer, fill_row
 from cdfctl.fields.kernel.structs import Struct
+from cdfctl.fields.kernel.vec import ZERO, vec
 from cdfctl.types import Array, BoolArray
 
 NEARER = 0.8  # of the distance at which a piece was tried in vain, where it is tried again
@@ -36,29 +39,52 @@ def new_pieces(k: int) -> Pieces:
 
 
 @njit
-def place_at(body: Body, q: Array, held: Array, found: Candidates) -> None:
-    """Place the joints at q, held within the limits, for :func:`pieces_at`; ``held`` (n,) is for that."""
+def place_at(body: Body, q: Array, held: Array, found: Candidates) -> bool:
+    """Place the joints at q, held within the limits, for :func:`pieces_at`; ``held`` (n,) is for that. Whether q was
+    within them."""
+    inside = True
     for j in range(q.shape[0]):
         held[j] = min(max(q[j], body.chain.lower[j]), body.chain.upper[j])
+        inside = inside and held[j] == q[j]
     forward(body, held, found.frames, found.place.shape[0])
+    return inside
 
 
 @njit
 def pieces_at(body: Body, q: Array, parts: Parts, o: int, found: Candidates, pieces: Pieces, work: Work) -> int:
-    """The first candidates become the pieces as they stand at q, in their order; the one nearest to obstacle o.
+    """The first candidates become the pieces as they stand at q, in their order; the one nearest to obstacle o, or -1.
 
     That one is measured, and those that were in question; the others have an infinite cost.
     """
-    nearest, place = 0, found.place.shape[0]
     for k in range(body.joint.shape[0]):
-        found.piece[k], found.place[k], found.cost[k] = k, place, np.inf
+        found.piece[k], found.place[k], found.cost[k] = k, found.place.shape[0], np.inf
         pieces.bound[k], pieces.measured[k] = _bound(body, found, k, parts, o), False
+    return nearest_of(body, q, parts, o, found, pieces, 0, body.joint.shape[0], work)
+
+
+@njit
+def nearest_of(
+    body: Body,
+    q: Array,
+    parts: Parts,
+    o: int,
+    found: Candidates,
+    pieces: Pieces,
+    first: int,
+    last: int,
+    work: Work,
+) -> int:
+    """The nearest of the pieces ``first`` … ``last`` - 1, measured, or -1: that of the least bound, or another whose
+    bound is below its distance."""
+    if first == last:
+        return -1
+    nearest = first
+    for k in range(first, last):
         if pieces.bound[k] < pieces.bound[nearest]:
             nearest = k
-    first = nearest
-    for i in range(body.joint.shape[0]):
-        k = first if i == 0 else i - 1 if i <= first else i
-        if i == 0 or pieces.bound[k] < pieces.bound[nearest]:
+    measure_piece(body, q, parts, o, found, pieces, nearest, work)
+    for k in range(first, last):
+        if pieces.bound[k] < pieces.bound[nearest]:
             measure_piece(body, q, parts, o, found, pieces, k, work)
             if pieces.bound[k] < pieces.bound[nearest]:
                 nearest = k
@@ -80,10 +106,29 @@ def _bound(body: Body, found: Candidates, k: int, parts: Parts, o: int) -> float
 def measure_piece(
     body: Body, q: Array, parts: Parts, o: int, found: Candidates, pieces: Pieces, k: int, work: Work
 ) -> None:
-    """Candidate k, piece k at q, is evaluated."""
-    begin(body, q, found, k, k, q)
-    evaluate_placed(body, q, parts, o, found, k, work)
-    pieces.bound[k], pieces.measured[k] = found.f[k], True
+    """Candidate k, piece k at q, is evaluated, if it has not been."""
+    if not pieces.measured[k]:
+        begin(body, q, found, k, k, q)
+        evaluate_placed(body, q, parts, o, found, k, work)
+        pieces.bound[k], pieces.measured[k] = found.f[k], True
+
+
+@njit
+def distance_rows(
+    body: Body, q: Array, parts: Parts, o: int, found: Candidates, pieces: Pieces, answer: Answer, work: Work
+) -> None:
+    """The rows of obstacle o in ``answer``, which has as many an obstacle: none, that of the nearest piece, or one a
+    link. :func:`pieces_at` must have been called, at a q within the limits."""
+    rows = answer.d.shape[0] // (parts.first.shape[0] - 1)
+    for i in range(rows):
+        first, last = (body.first[i], body.first[i + 1]) if rows > 1 else (0, body.joint.shape[0])
+        k, row = nearest_of(body, q, parts, o, found, pieces, first, last, work), o * rows + i
+        if k < 0:
+            fill_row(body, parts, o, k, np.inf, ZERO, ZERO, ZERO, answer, row)
+        else:
+            copy(found.g[k], answer.dq[row])
+            a, b, normal = vec(found.a, k), vec(found.b, k), vec(found.normal, k)
+            fill_row(body, parts, o, k, found.f[k], a, b, normal, answer, row)
 
 
 @njit
@@ -101,8 +146,7 @@ def all_pieces(
 ) -> None:
     """Evaluate all of them; they count as tried."""
     for k in range(body.joint.shape[0]):
-        if not pieces.measured[k]:
-            measure_piece(body, q, parts, o, found, pieces, k, work)
+        measure_piece(body, q, parts, o, found, pieces, k, work)
         memory.tried[o, k] = pieces.bound[k]
 
 
@@ -123,7 +167,7 @@ def promising_piece(
         wanted = pieces.bound[k] < NEARER * memory.tried[o, k]
         for c in range(first, last):
             wanted = wanted and found.piece[c] != k
-        if wanted and not pieces.measured[k]:
+        if wanted:
             measure_piece(body, q, parts, o, found, pieces, k, work)
             wanted = pieces.bound[k] < NEARER * memory.tried[o, k]
         if wanted and found.cost[k] < nearest and (best < 0 or found.cost[k] < found.cost[best]):

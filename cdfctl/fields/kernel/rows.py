@@ -21,7 +21,7 @@ from cdfctl.fields.kernel.distance import (
 from cdfctl.fields.kernel.jit import njit
 from cdfctl.fields.kernel.parts import Parts, time_derivative
 from cdfctl.fields.kernel.structs import Struct
-from cdfctl.fields.kernel.vec import ZERO, store
+from cdfctl.fields.kernel.vec import ZERO, Vec, store
 from cdfctl.types import Array, BoolArray, IntArray
 
 STILL = 1e-9  # a gradient shorter than this, m/rad or m/m, means that no joint can change the distance
@@ -129,18 +129,27 @@ def nearest_in_block(
 
 @njit
 def _fill(body: Body, frames: Frames, parts: Parts, o: int, k: int, contact: Contact, answer: Answer, row: int) -> None:
-    answer.d[row] = contact.d
-    store(answer.a, row, contact.a)
-    store(answer.b, row, contact.b)
-    store(answer.normal, row, contact.normal)
+    if k >= 0:
+        gradient(body, frames, 0, body.joint[k], contact.a, contact.normal, answer.dq[row])
+    fill_row(body, parts, o, k, contact.d, contact.a, contact.b, contact.normal, answer, row)
+
+
+@njit
+def fill_row(
+    body: Body, parts: Parts, o: int, k: int, d: float, a: Vec, b: Vec, normal: Vec, answer: Answer, row: int
+) -> None:
+    """Row ``row`` from the contact of piece k, -1 for none, with obstacle o; its ``dq`` has been filled."""
+    answer.d[row] = d
+    store(answer.a, row, a)
+    store(answer.b, row, b)
+    store(answer.normal, row, normal)
     dq = answer.dq[row]
     if k < 0:
         answer.link[row], answer.dt[row], answer.valid[row] = -1, 0.0, False
         dq[:] = 0.0
         return
     answer.link[row] = body.link[k]
-    answer.dt[row] = time_derivative(parts, o, contact.b, contact.normal)
-    gradient(body, frames, 0, body.joint[k], contact.a, contact.normal, dq)
+    answer.dt[row] = time_derivative(parts, o, b, normal)
     length2 = 0.0
     for i in range(dq.shape[0]):
         length2 += dq[i] * dq[i]

@@ -24,6 +24,7 @@ from cdfctl.fields.kernel.body import Body, body_of
 from cdfctl.fields.kernel.cdf_rows import contact_rows, new_contact_rows, new_workspace
 from cdfctl.fields.kernel.memory import Memory, new_memory
 from cdfctl.fields.kernel.parts import parts_of, turn_obstacles
+from cdfctl.fields.kernel.rows import new_answer
 from cdfctl.fields.kernel.starts import Table, empty_table, new_starts, table_starts
 from cdfctl.fields.table.build import Progress
 from cdfctl.fields.table.contacts import new_tools, point_contacts
@@ -248,7 +249,8 @@ class HeldOut:
         """The distance to the ball at ``point``, inf for none, and whether q is clear of it."""
         rows = new_contact_rows(1, 1, self._n)
         self._parts.pose[0, :3] = point
-        contact_rows(self._body, q, self._parts, memory, table, 1, False, rows, self._work)
+        distances = new_answer(0, self._n)
+        contact_rows(self._body, q, self._parts, memory, table, 1, False, rows, distances, self._work)
         return (float(rows.d[0]) if rows.count[0] else np.inf), bool(rows.f[0] > 0.0)
 
     def _memory(self) -> Memory:
