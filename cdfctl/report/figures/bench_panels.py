@@ -205,7 +205,7 @@ def _legend(name: str, bench: StoredBench, methods: list[str]) -> list[Any]:
     }
     if name == "clearance":
         handles = [sample(label=method, markersize=4.0, **marker(i)) for i, method in enumerate(methods)]
-        handles.append(sample(label="failed (any colour)", marker="x", color=BLACK, markersize=4.0))
+        handles.append(sample(label="failed, at the time limit (any colour)", marker="x", color=BLACK, markersize=4.0))
         handles.append(Line2D([], [], color=VERMILION, linewidth=0.8, linestyle="--", label="contact"))
         return handles
     if name == "success":
@@ -217,7 +217,7 @@ def _legend(name: str, bench: StoredBench, methods: list[str]) -> list[Any]:
         mean = "mean, failures as the limit" if name == "time" else "mean"
         handles = [
             sample(label="a success", marker="|", markersize=5, color=GREY),
-            Line2D([], [], color=GREY, linewidth=4.5, alpha=0.6, label="quartiles, median"),
+            Line2D([], [], color=GREY, linewidth=4.5, alpha=0.6, solid_capstyle="butt", label="quartiles, median"),
             sample(label=mean, marker="o", markersize=4.5, color=BLACK),
         ]
     if papers:
