@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 from rich.console import Group, RenderableType
 from rich.panel import Panel
 from rich.text import Text
@@ -73,11 +74,18 @@ def headline(result: RunResult) -> str:
                 return f"COLLISION: {result.reason}"  # the plant felt what the judge does not see
             return f"COLLISION at {seconds(contact.time)}: {contact.link} touches {contact.obstacle}"
         case "timeout":
-            return f"TIMEOUT: not reached within {simulation.time_limit:g} s, without contact{but_itself}"
+            text = f"TIMEOUT: not reached within {simulation.time_limit:g} s, without contact{but_itself}"
+            return text + ("; the target was never within reach" if never_within_reach(result) else "")
         case "infeasible":
             return f"INFEASIBLE at {seconds(float(result.trajectory.t[-1]))}: no velocity satisfies all constraints"
         case "error":
             return f"ERROR at {seconds(float(result.trajectory.t[-1]))}: {result.reason or 'the run did not finish'}"
+
+
+def never_within_reach(result: RunResult) -> bool:
+    """Whether no configuration touched the target at any step: V, the distance to it, is infinite throughout."""
+    values = result.trajectory.V
+    return bool(len(values)) and bool(np.isposinf(values).all())
 
 
 def figures(result: RunResult, run_dir: str, tip: str) -> list[tuple[str, str]]:
