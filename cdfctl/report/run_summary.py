@@ -38,6 +38,10 @@ UNITS: Mapping[str, str] = {
 """How a plant's names end, and the unit that says; a longer one before its own ending."""
 
 
+OTHER_UNITS: Mapping[str, str] = {"servo_gain": "N m s/rad"}
+"""Units of names that do not end in theirs."""
+
+
 def run_summary(result: RunResult, run_dir: str, tip: str, notes: Sequence[str] = ()) -> RenderableType:
     """The whole summary, legible at 80 columns and without colour.
 
@@ -119,10 +123,11 @@ def plant_figures(report: Report) -> list[tuple[str, str]]:
         if value is None:
             continue
         suffix = next((s for s in UNITS if name.endswith(s)), "")
+        unit = UNITS.get(suffix, OTHER_UNITS.get(name))
         large = isinstance(value, float) and abs(value) >= 1000.0
         shown = str(value) if not isinstance(value, float) else f"{value:.0f}" if large else f"{value:.3g}"
         label = name.removesuffix(suffix).replace("_", " ")
-        lines.append((label, f"{shown} {UNITS[suffix]}" if suffix else shown))
+        lines.append((label, f"{shown} {unit}" if unit else shown))
     return lines
 
 

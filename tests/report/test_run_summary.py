@@ -144,7 +144,7 @@ def test_what_the_plant_reports_has_units(result):
     assert {" ".join(line.split()) for line in lines} >= {
         "plant mujoco",
         "velocity error max 0.0123 rad/s",
-        "servo gain 1333",
+        "servo gain 1333 N m s/rad",
     }
     assert not any("contact time" in line for line in lines)
 
