@@ -1,11 +1,11 @@
-"""``cdfctl check``: validate a scenario, and do nothing else."""
+"""``cdfctl check``: validate a scenario, say what was made of its robot, and do nothing else."""
 
 from __future__ import annotations
 
 from dataclasses import asdict
 
 from cdfctl.cli import options
-from cdfctl.cli.console import write, write_json
+from cdfctl.cli.console import show, write, write_json
 
 
 def check(
@@ -18,7 +18,7 @@ def check(
     quiet: options.Quiet = False,
     debug: options.Debug = False,
 ) -> None:
-    """Validate a scenario, also against its robot, and run nothing."""
+    """Validate a scenario against its robot; run nothing."""
     from cdfctl.scenario.library import load_scenario
     from cdfctl.scenario.problems import ScenarioErrors
 
@@ -31,10 +31,14 @@ def check(
         if json:
             write_json({"file": errors.file, "valid": False, "problems": [asdict(p) for p in errors.problems]})
         raise
+    from cdfctl.report.robot_summary import joint_facts, robot_summary
+
     if json:
-        write_json({"file": file.shown, "valid": True, "problems": []})
+        robot = {"name": wired.robot.name, "joints": joint_facts(wired.robot), "notes": wired.robot.notes}
+        write_json({"file": file.shown, "valid": True, "problems": [], "robot": robot})
     elif not quiet:
         count = len(wired.scenario.obstacles)
         obstacles = "1 obstacle" if count == 1 else f"{count} obstacles"
-        robot = f"{wired.robot.name} ({wired.robot.n} joints)"
-        write(f"{scenario}: valid: {robot}, {obstacles}, {wired.scenario.controller.variant}")
+        named = f"{wired.robot.name} ({wired.robot.n} joints)"
+        write(f"{scenario}: valid: {named}, {obstacles}, {wired.scenario.controller.variant}")
+        show(robot_summary(wired.robot))

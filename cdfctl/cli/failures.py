@@ -30,6 +30,7 @@ def report_usage(error: Exception, *, debug: bool) -> int:
     if debug:
         traceback.print_exception(error)
     message = error.format_message() if hasattr(error, "format_message") else str(error)
+    message = message.replace("Value error, ", "").replace("Input should be", "must be")  # pydantic's, through Typer
     context = getattr(error, "ctx", None)
     command = context.command_path if context is not None else "cdfctl"
     print(f"cdfctl: error: {message}\n  hint   {command} --help", file=sys.stderr)

@@ -32,11 +32,11 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 app.command("run")(run.run)
-app.command("bench")(bench.bench)
+app.command("bench", short_help="Run many trials of scenarios under controllers.")(bench.bench)
 app.command("check")(check.check)
-app.command("build-cdf")(build_cdf.build_cdf)
-app.command("plot")(plot.plot)
-app.command("view")(view.view)
+app.command("build-cdf", short_help="Build a robot's table of contact configurations.")(build_cdf.build_cdf)
+app.command("plot", short_help="Draw figures of a run, a benchmark or the paper.")(plot.plot)
+app.command("view", short_help="Replay a run in the browser.")(view.view)
 app.command("robots")(robots.robots)
 app.command("scenarios")(scenarios.scenarios)
 app.command("schema")(schema.schema)
@@ -58,7 +58,7 @@ def _root(
     debug: options.Debug = False,
 ) -> None:
     if context.invoked_subcommand is None:
-        print(context.get_help(), end="")
+        print(context.get_help())
         raise typer.Exit(2)
 
 

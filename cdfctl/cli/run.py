@@ -54,8 +54,11 @@ def run(
     from cdfctl.simulation.run_folder import check_target, default_folder, write_run
 
     wired = assemble(file, trial=trial)
-    if VARIANTS[wired.scenario.controller.variant].field != "sdf" and (hint := run_hint(wired.robot)):
-        note(hint, quiet=quiet)
+    if VARIANTS[wired.scenario.controller.variant].field != "sdf":
+        body = wired.scenario.robot
+        changed = bool(body.lock or body.limits.position)
+        if hint := run_hint(wired.robot, str(body.name or body.urdf), changed=changed):
+            note(hint, quiet=quiet)
     if dry_run:
         return rehearse(wired, json=json, quiet=quiet)
     folder = out if out is not None else default_folder(wired.scenario, trial)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 from rich.console import Group, RenderableType
 from rich.panel import Panel
 from rich.text import Text
@@ -35,6 +36,10 @@ UNITS: Mapping[str, str] = {
     "_s": "s",
 }
 """How a plant's names end, and the unit that says; a longer one before its own ending."""
+
+
+OTHER_UNITS: Mapping[str, str] = {"servo_gain": "N m s/rad"}
+"""Units of names that do not end in theirs."""
 
 
 def run_summary(result: RunResult, run_dir: str, tip: str, notes: Sequence[str] = ()) -> RenderableType:
@@ -73,11 +78,18 @@ def headline(result: RunResult) -> str:
                 return f"COLLISION: {result.reason}"  # the plant felt what the judge does not see
             return f"COLLISION at {seconds(contact.time)}: {contact.link} touches {contact.obstacle}"
         case "timeout":
-            return f"TIMEOUT: not reached within {simulation.time_limit:g} s, without contact{but_itself}"
+            text = f"TIMEOUT: not reached within {simulation.time_limit:g} s, without contact{but_itself}"
+            return text + ("; the target was never within reach" if never_within_reach(result) else "")
         case "infeasible":
             return f"INFEASIBLE at {seconds(float(result.trajectory.t[-1]))}: no velocity satisfies all constraints"
         case "error":
             return f"ERROR at {seconds(float(result.trajectory.t[-1]))}: {result.reason or 'the run did not finish'}"
+
+
+def never_within_reach(result: RunResult) -> bool:
+    """Whether no configuration touched the target at any step: V, the distance to it, is infinite throughout."""
+    values = result.trajectory.V
+    return bool(len(values)) and bool(np.isposinf(values).all())
 
 
 def figures(result: RunResult, run_dir: str, tip: str) -> list[tuple[str, str]]:
@@ -111,10 +123,11 @@ def plant_figures(report: Report) -> list[tuple[str, str]]:
         if value is None:
             continue
         suffix = next((s for s in UNITS if name.endswith(s)), "")
+        unit = UNITS.get(suffix, OTHER_UNITS.get(name))
         large = isinstance(value, float) and abs(value) >= 1000.0
         shown = str(value) if not isinstance(value, float) else f"{value:.0f}" if large else f"{value:.3g}"
         label = name.removesuffix(suffix).replace("_", " ")
-        lines.append((label, f"{shown} {UNITS[suffix]}" if suffix else shown))
+        lines.append((label, f"{shown} {unit}" if unit else shown))
     return lines
 
 

@@ -208,7 +208,13 @@ def _resolve_mesh(path: Path, link: str, name: str, package_dirs: Sequence[Path]
         if candidate.exists():
             check_mesh_file(candidate)
             return candidate.resolve()
-    hint = "give the directory that holds the package as a package directory" if name.startswith("package://") else None
+    hint = None
+    if name.startswith("package://"):
+        # Where the package is known, it is the file that is missing.
+        package, *rest = Path(name.removeprefix("package://")).parts or ("",)
+        roots = [(c, c.parents[len(rest) - 1]) for c in candidates if rest]
+        known = next((c for c, root in roots if root.name == package and root.is_dir()), None)
+        hint = f"it would be {known}" if known else f"name the folder that holds '{package}' in package_dirs"
     raise InputError(f"{path}: mesh '{name}' of link '{link}' is not there", hint=hint)
 
 

@@ -34,7 +34,7 @@ def _joint_counts(data: dict[str, Any]) -> Iterator[Complaint]:
         if isinstance(value, list | tuple) and value and len(value) != len(start):
             yield (
                 f"expected {len(start)} numbers, as many as robot.q0, found {len(value)}",
-                "one number a joint, in the order of robot.q0",
+                "one number a joint in both lists: either may be the wrong one",
                 place,
             )
 

@@ -93,7 +93,8 @@ class ScenarioErrors(InputError):  # noqa: N818  the plural says that it carries
         parts = [str(problem) for problem in self.problems[:SHOWN]]
         if count > SHOWN:
             parts.append(f"... and {count - SHOWN} more")
-        parts.append(f"{count} problem{'' if count == 1 else 's'} in {file}; nothing was run.")
+        where = file if any(problem.origin is None for problem in self.problems) else "the command line"
+        parts.append(f"{count} problem{'' if count == 1 else 's'} in {where}; nothing was run.")
         super().__init__("\n".join(parts))
 
     def __reduce__(self) -> tuple[type[ScenarioErrors], tuple[list[Problem], str]]:

@@ -29,7 +29,11 @@ def obstructions(scenario: Scenario) -> list[Complaint]:
     able = [v.name for v in VARIANTS.values() if task in TASKS_OF[v.task]]
     if able:
         allowed = f"controllers for it: {', '.join(able)}; tasks of {variant.name}: {', '.join(TASKS_OF[variant.task])}"
-        return [(f"controller '{variant.name}' cannot do task '{task}'", allowed, ("controller", "variant"))]
+        if "variant" in scenario.controller.model_fields_set:
+            return [(f"controller '{variant.name}' cannot do task '{task}'", allowed, ("controller", "variant"))]
+        # Nobody named that controller: what stands in the file is the task.
+        message = f"the controller taken where none is named, '{variant.name}', cannot do task '{task}'"
+        return [(message, f"set controller.variant; {allowed}", ("task", "type"))]
     runnable = [t for kind, tasks in TASKS_OF.items() for t in tasks if any(v.task == kind for v in VARIANTS.values())]
     return [(f"task '{task}' is not available yet", name_hint(task, runnable), ("task", "type"))]
 

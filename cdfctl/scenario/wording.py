@@ -97,7 +97,7 @@ def _complaints(model: type[BaseModel], detail: ErrorDetails, data: Any) -> Iter
     elif kind == "missing":
         yield f"missing key '{place[-1]}'", _description(model, detail["loc"]), place
     elif kind == "extra_forbidden":
-        yield f"unknown key '{place[-1]}'", _nearest(str(place[-1]), _keys(model, detail["loc"][:-1])), place
+        yield f"unknown key '{place[-1]}'", _nearest(str(place[-1]), _keys(model, detail["loc"][:-1]), model), place
     elif kind in ("literal_error", "union_tag_invalid"):
         tag = kind == "union_tag_invalid"
         allowed = str(context["expected_tags" if tag else "expected"]).replace("'", "").replace(" or ", ", ")
@@ -142,11 +142,23 @@ def _is_guess(hint: str) -> bool:
     return hint.startswith("did you mean ")
 
 
-def _nearest(key: str, allowed: list[str]) -> str | None:
+def _nearest(key: str, allowed: list[str], model: type[BaseModel]) -> str | None:
     if key == "<<":
         return "merge keys are not accepted: write the keys out"
-    near = difflib.get_close_matches(key.lower(), allowed, n=1, cutoff=0.6)
+    near = difflib.get_close_matches(key.lower(), allowed, n=1, cutoff=0.6) or _elsewhere(key, model)
     return f"did you mean {near[0]}?" if near else f"allowed: {', '.join(allowed)}" if allowed else None
+
+
+def _elsewhere(key: str, model: type[BaseModel]) -> list[str]:
+    """``margin`` is ``controller.margin``: the one section of ``model`` that has such a key, if there is just one."""
+    found = [
+        f"{section}.{key}"
+        for section, field in model.model_fields.items()
+        if isinstance(field.annotation, type)
+        and issubclass(field.annotation, BaseModel)
+        and key in field.annotation.model_fields
+    ]
+    return found if len(found) == 1 else []
 
 
 def _choice(wrong: str, allowed: list[str]) -> str:

@@ -23,6 +23,8 @@ from cdfctl.simulation.shapes import shape_of, vector_of
 Place = tuple[str | int, ...]
 
 DEGREES = "angles are in radians: 90 degrees is 1.5708"
+METRES = "; lengths are in metres"
+FAR = 1.0  # m: so deep is nothing that was meant
 
 
 def robot_of(config: RobotConfig) -> Robot:
@@ -151,7 +153,8 @@ def _start_in_contact(scenario: Scenario, robot: Robot) -> Iterator[Complaint]:
             place: Place = (
                 ("obstacles", i, "position") if scenario.obstacles[i].position is not None else ("obstacles", i)
             )
-            yield message, "move the obstacle or robot.q0, or draw another trial", place
+            hint = "move the obstacle or robot.q0, or draw another trial"
+            yield message, hint + (METRES if found.distance < -FAR else ""), place
 
 
 def _start_in_self_contact(scenario: Scenario, robot: Robot) -> Iterator[Complaint]:

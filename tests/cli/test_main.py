@@ -37,6 +37,17 @@ def test_no_command_shows_the_help_and_is_a_usage_error(cli):
     result = cli()
     assert result.status == 2
     assert "Commands:" in result.out
+    assert result.out.endswith("interrupted.\n")
+    assert "..." not in result.out.partition("Commands:")[2]  # what a command is for, in one line
+
+
+@pytest.mark.parametrize("words", [("run", "C1", "--seed", "-1"), ("bench", "--suite", "papr")])
+def test_an_option_s_value_is_refused_in_our_words(cli, words):
+    result = cli(*words)
+    assert result.status == 2
+    assert f"Invalid value for '{words[-2]}'" in result.err
+    for jargon in ("Input should", "Value error"):
+        assert jargon not in result.err
 
 
 def test_version(cli):

@@ -52,6 +52,8 @@ def test_a_run_gets_its_figures_in_a_folder_of_its_own(cli, run):
     again = cli("plot", "run", "--figure", "time", "--at", "0.5", "--quiet")
     assert (again.status, again.out, again.err) == (0, "", "")
     assert (run / "figures" / "time.png").exists()
+    late = cli("plot", "run", "--at", "99")
+    assert (late.status, late.err.startswith("cdfctl: error: --at 99 is after the end of the run, ")) == (2, True)
 
 
 def test_one_file_gets_them_all(cli, here, run):
@@ -82,6 +84,7 @@ def test_a_benchmark_is_drawn(cli, here, small):
     assert [figure["figure"] for figure in result.document()["figures"]] == names
     assert all((here / "store" / "figures" / f"{name}.png").exists() for name in names)
     assert "are for runs" in cli("plot", "store", "--at", "1").err
+    assert "unknown figure of a benchmark 'joint-space'" in cli("plot", "store", "--figure", "joint-space").err
     # It goes on as a store: what was drawn does not disturb it.
     assert cli("bench", *arguments).status == 0
 

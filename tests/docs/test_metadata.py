@@ -61,3 +61,10 @@ def test_public_names_and_their_homes_agree():
     assert {*cdfctl._HOME, "__version__"} == set(cdfctl.__all__)
     for name, home in cdfctl._HOME.items():
         assert getattr(cdfctl, name).__module__.startswith(home.rpartition(".")[0])
+
+
+def test_the_page_on_installing_names_every_extra():
+    page = (ROOT / "docs" / "install.md").read_text()
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    for extra in extras:
+        assert f"`{extra}`" in page, extra

@@ -185,13 +185,13 @@ def test_a_field_takes_the_table_of_the_cache_or_says_why_not(
     monkeypatch.setenv("CDFCTL_CACHE", str(tmp_path))
     ball = Scene([Obstacle(Sphere(0.05), [1.0, 2.5, 0.0])])
     assert table_status(planar).state == "missing"
-    assert "cdfctl build-cdf planar" in str(run_hint(planar))
+    assert str(run_hint(planar, "planar")).endswith("hint   cdfctl build-cdf planar")
     without = make_field("cdf", planar).query([0.3, 0.3], ball)
     target = table_path(planar)
     target.parent.mkdir(parents=True)
     target.write_bytes(content)
     assert table_status(planar).state == "ready"
-    assert run_hint(planar) is None
+    assert run_hint(planar, "planar") is None
     with caplog.at_level(logging.WARNING):
         with_table = make_field("cdf", planar).query([0.3, 0.3], ball)
         assert caplog.text == ""
@@ -201,6 +201,23 @@ def test_a_field_takes_the_table_of_the_cache_or_says_why_not(
         make_field("cdf", planar)
     assert "contact table ignored" in caplog.text
     assert "cdfctl build-cdf planar --force" in caplog.text
+
+
+def test_the_hint_of_a_run_is_a_command_that_can_be_typed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, planar: Robot
+) -> None:
+    monkeypatch.setenv("CDFCTL_CACHE", str(tmp_path / "cache"))
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "my arms" / "mine.urdf"
+    path.parent.mkdir()
+    path.write_text(planar.urdf.read_text())
+    mine = load_robot(path)
+    hint = str(run_hint(mine, str(path)))
+    assert hint.endswith("  hint   cdfctl build-cdf 'my arms/mine.urdf'")
+    assert max(map(len, hint.splitlines())) <= 80
+    assert table_status(mine).command == "cdfctl build-cdf 'my arms/mine.urdf'"
+    # A table of the file is of another robot than the one with the scenario's locks.
+    assert "build it of a robot file" in str(run_hint(mine, str(path), changed=True))
 
 
 def test_a_table_that_cannot_be_written_is_one_message(planar: Robot, path: Path, tmp_path: Path) -> None:

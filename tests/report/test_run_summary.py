@@ -101,6 +101,15 @@ def test_every_outcome_has_its_headline(result, changes, steps, headline):
     assert f"{result.infeasible_steps} of {steps} (on_infeasible: least-violation)" in text
 
 
+def test_a_target_out_of_reach_is_told_from_one_that_was_missed(result):
+    late = replace(result, verdict=replace(REACHED, outcome="timeout", time_to_reach=None))
+    far = replace(late, trajectory=replace(late.trajectory, V=np.full(31, np.inf)))
+    assert "the target was never within reach" in " ".join(rendered(far).replace("│", "").split())
+    missed = replace(late, trajectory=replace(late.trajectory, V=np.append(np.full(30, np.inf), 0.4)))
+    assert "never within reach" not in rendered(missed)
+    assert "never within reach" not in rendered(late)
+
+
 def test_it_fits_80_columns_and_has_no_colour_where_none_is_wanted(result):
     text = rendered(result, no_color=True)
     assert "\x1b" not in text
@@ -135,7 +144,7 @@ def test_what_the_plant_reports_has_units(result):
     assert {" ".join(line.split()) for line in lines} >= {
         "plant mujoco",
         "velocity error max 0.0123 rad/s",
-        "servo gain 1333",
+        "servo gain 1333 N m s/rad",
     }
     assert not any("contact time" in line for line in lines)
 

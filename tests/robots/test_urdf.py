@@ -77,7 +77,7 @@ def test_package_directories(tmp_path, write_urdf, xml, place):
     assert load_robot(path, package_dirs=[tmp_path / place]).n == 1
     with pytest.raises(InputError, match="of link 'l1' is not there") as caught:
         load_robot(path)
-    assert "package directory" in str(caught.value.hint)
+    assert caught.value.hint == "name the folder that holds 'my_robot' in package_dirs"
 
 
 def test_a_package_is_not_left(tmp_path, write_urdf, xml):

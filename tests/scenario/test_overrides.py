@@ -58,7 +58,13 @@ def test_what_is_wrong_is_said_under_the_overrides_name(load, override, message)
     assert problem.origin == f"--set {override}"
     assert message in problem.message
     assert str(caught.value).startswith(f"--set {override}: error: ")
-    assert "mine.yaml; nothing was run." in str(caught.value)
+    assert str(caught.value).endswith("1 problem in the command line; nothing was run.")
+
+
+def test_a_field_without_its_section_is_found(load):
+    with pytest.raises(ScenarioErrors) as caught:
+        load(overrides=["margin=0.1"])
+    assert caught.value.problems[0].hint == "did you mean controller.margin?"
 
 
 @pytest.mark.parametrize(

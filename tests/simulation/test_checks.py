@@ -98,6 +98,8 @@ def test_start_in_contact_names_every_obstacle_and_the_link(file: Path) -> None:
     # link1 lies along x: the ball at y = 0.25 is 0.05 m deep.
     assert "'0' is in contact with link1 (50.0 mm deep)" in found["obstacles[0].position"]
     assert "link2" in found["obstacles[1].position"]
+    assert "lengths are in metres" not in str(found)
+    assert "lengths are in metres" in str(problems(file, PLANAR.replace("radius: 0.3", "radius: 300")))
 
 
 def test_unknown_joints_of_each_section(file: Path) -> None:
@@ -147,6 +149,15 @@ def test_a_given_robot_is_used(file: Path) -> None:
     file.write_text(PLANAR)
     first = assemble(load_scenario(file))
     assert assemble(load_scenario(file), robot=first.robot).robot is first.robot
+
+
+def test_a_task_the_default_controller_does_not_do_is_shown_where_it_stands(file: Path) -> None:
+    target = "type: reach\n  target: {position: [2.0, 2.0, 0.0], shape: {type: ball, radius: 0.3}}"
+    text = PLANAR.replace("type: joint-goal\n  goal: [1.0, 0.5]", target)
+    assert "controller:" not in text
+    found = problems(file, text)
+    assert list(found) == ["task.type"]
+    assert "the controller taken where none is named, 'dual-tvcbf-qp', cannot do task 'reach'" in found["task.type"]
 
 
 def test_a_task_the_controller_does_not_do_is_named() -> None:

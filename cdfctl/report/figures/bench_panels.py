@@ -47,6 +47,13 @@ def groups(bench: StoredBench) -> list[Group]:
     return [Group(f"{name}, {rule}" if several else name, tuple(cells)) for (name, rule), cells in found.items()]
 
 
+def bench_title(bench: StoredBench) -> str:
+    """What was run, and how often."""
+    trials = sorted({item.summary.trials for item in bench.cells})
+    counted = f"{trials[0]}" if len(trials) == 1 else f"{trials[0]}–{trials[-1]}"
+    return f"{bench.suite}: {counted} trials of each, seed {bench.seed}"
+
+
 def bench_parts(bench: StoredBench) -> list[Part]:
     """The four figures."""
     drawers: dict[str, Callable[[Axes, Group, list[str]], None]] = {
@@ -90,9 +97,7 @@ def _part(name: str, draw: Callable[[Axes, Group, list[str]], None], bench: Stor
                     axes.tick_params(labelleft=False)
                 if not lines and i % columns == 0:
                     axes.set_ylabel("least clearance [m]")
-        trials = sorted({item.summary.trials for item in bench.cells})
-        counted = f"{trials[0]}" if len(trials) == 1 else f"{trials[0]}–{trials[-1]}"
-        canvas.suptitle(f"{bench.suite}: {counted} trials of each, seed {bench.seed}", x=0.01, ha="left")
+        canvas.suptitle(bench_title(bench), x=0.01, ha="left")
         handles, across = _legend(name, bench, methods), 3 if name in ("time", "path") else 5
         canvas.legend(
             handles=handles,
@@ -205,7 +210,7 @@ def _legend(name: str, bench: StoredBench, methods: list[str]) -> list[Any]:
     }
     if name == "clearance":
         handles = [sample(label=method, markersize=4.0, **marker(i)) for i, method in enumerate(methods)]
-        handles.append(sample(label="failed (any colour)", marker="x", color=BLACK, markersize=4.0))
+        handles.append(sample(label="failed, at the time limit (any colour)", marker="x", color=BLACK, markersize=4.0))
         handles.append(Line2D([], [], color=VERMILION, linewidth=0.8, linestyle="--", label="contact"))
         return handles
     if name == "success":
@@ -217,7 +222,7 @@ def _legend(name: str, bench: StoredBench, methods: list[str]) -> list[Any]:
         mean = "mean, failures as the limit" if name == "time" else "mean"
         handles = [
             sample(label="a success", marker="|", markersize=5, color=GREY),
-            Line2D([], [], color=GREY, linewidth=4.5, alpha=0.6, label="quartiles, median"),
+            Line2D([], [], color=GREY, linewidth=4.5, alpha=0.6, solid_capstyle="butt", label="quartiles, median"),
             sample(label=mean, marker="o", markersize=4.5, color=BLACK),
         ]
     if papers:

@@ -49,7 +49,8 @@ def source_parts(source: Path, names: Sequence[str], fields: tuple[str, ...] | N
     by_name = {part.name: part for part in parts}
     for name in names:
         if name not in by_name:
-            raise unknown_name("figure", name, [*by_name, OVERVIEW])
+            kind = "a benchmark" if (source / MANIFEST).is_file() else "this run"
+            raise unknown_name(f"figure of {kind}", name, [*by_name, OVERVIEW])
     return [by_name[name] for name in names]
 
 
@@ -72,6 +73,10 @@ def _of_run(source: Path, fields: tuple[str, ...] | None, at: Sequence[float]) -
 
     view = view_run(source)
     parts = [task_space(view)] if view.in_plane else []
+    end = float(view.t[-1])
+    for t in at:
+        if t > end + 1e-9:
+            raise InputError(f"--at {t:g} is after the end of the run, {end:g} s")
     if view.two_joints:
         instants = sorted({view.step_at(t) for t in at}) if at else default_instants(view)
         parts.append(joint_space(view, fields or view.field_names, instants))

@@ -76,7 +76,7 @@ def _joints(canvas: Canvas, axes: Axes, view: RunView, k: int, points: int | Non
 def _arms(axes: Axes, view: RunView, k: int) -> None:
     picked = np.unique(np.linspace(0, k, 6).round().astype(int))
     until = view.until(k)
-    draw_strobe(axes, until, picked, times=False)
+    draw_strobe(axes, until, picked)
     draw_arrows(axes, until, k)
     handles = draw_paths(axes, until)
     frame(axes, view, np.arange(view.steps + 1))

@@ -23,7 +23,7 @@ from cdfctl.simulation.shapes import vector_of
 from cdfctl.types import Array, Scene, Trajectory
 
 MOST_INSTANTS = 400
-"""At so many control steps, evenly spread, the clearance is measured."""
+"""At so many instants, evenly spread, the clearance is measured: of a short run between its control steps too."""
 
 
 @dataclass
@@ -97,15 +97,34 @@ class RunView:
     @cached_property
     def clearance(self) -> tuple[Array, Array]:
         """Instants (s, k) and the least signed distance (k, m) robot–obstacle there, m: by coal, as the judge."""
-        picked = np.unique(np.linspace(0, self.steps, min(self.steps + 1, MOST_INSTANTS)).round().astype(int))
+        instants = self._instants()
         measure = Clearance(self.robot, self.motion.shapes)
         if not measure.objects:
-            return self.t[picked], np.full((len(picked), measure.obstacles), np.inf)
+            return instants, np.full((len(instants), measure.obstacles), np.inf)
+        t, q = self.trajectory.path
         found = []
-        for k in picked:
-            measure.place(self.trajectory.q[k], self.trajectory.obstacle_pose[k])
+        for now in instants.tolist():
+            measure.place(np.array([np.interp(now, t, column) for column in q.T]), self._poses(now))
             found.append(measure.distances().reshape(measure.objects, measure.obstacles).min(axis=0))
-        return self.t[picked], np.array(found)
+        return instants, np.array(found)
+
+    def _instants(self) -> Array:
+        """Every control step, and as many instants between two as there is room for; or some of the steps."""
+        between = MOST_INSTANTS // max(self.steps, 1)
+        if between > 1:
+            return np.interp(np.arange(self.steps * between + 1) / between, np.arange(self.steps + 1), self.t)
+        picked: Array = self.t[
+            np.unique(np.linspace(0, self.steps, min(self.steps + 1, MOST_INSTANTS)).round().astype(int))
+        ]
+        return picked
+
+    def _poses(self, now: float) -> Array:
+        """Poses (m, 7) of the obstacles at ``now``: as declared, or as they were at the last step where measured."""
+        if self.scenario.feed is None:
+            return self.motion.poses(now)
+        k = int(np.searchsorted(self.t, now + 1e-9, side="right")) - 1
+        recorded: Array = self.trajectory.obstacle_pose[k]
+        return recorded
 
     @cached_property
     def plan(self) -> tuple[Array, Array] | None:

@@ -13,8 +13,10 @@ import numpy as np
 
 from cdfctl.benchmark.reading import CellTrials, StoredBench
 from cdfctl.benchmark.sweep import label
+from cdfctl.report.figures.bench_panels import bench_title
 from cdfctl.report.figures.part import Part
 from cdfctl.report.figures.style import COLUMN, FIELD_MAP, grid, legend_above, line, marker
+from cdfctl.scenario.reference import reference
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -70,8 +72,7 @@ def sweep_part(bench: StoredBench) -> Part:
                     _heat(canvas, one, panel, fields[:2], quantity)
                 else:
                     _lines(one, panel, fields[0], quantity)
-        trials = max(item.summary.trials for item in bench.cells)
-        canvas.suptitle(f"{bench.suite}: up to {trials} trials of each, seed {bench.seed}", x=0.01, ha="left")
+        canvas.suptitle(bench_title(bench), x=0.01, ha="left")
 
     return Part("sweep", height, draw)
 
@@ -85,6 +86,12 @@ def _panels(bench: StoredBench, *, two: bool) -> list[Panel]:
         rest = label(cell.settings[2:])
         found.setdefault(", ".join([*parts, *([rest] if rest else [])]), []).append(item)
     return [Panel(title, tuple(cells)) for title, cells in found.items()]
+
+
+def _with_unit(field: str) -> str:
+    """``controller.alpha [1/s]``: a field of the scenario as the label of an axis."""
+    unit = next((row.unit for row in reference() if row.path == field and row.unit), "")
+    return f"{field} [{unit}]" if unit else field
 
 
 def _values(cells: tuple[CellTrials, ...], field: str) -> list[str]:
@@ -108,7 +115,7 @@ def _lines(axes: Axes, panel: Panel, field: str, quantity: Quantity) -> None:
             for at, item in zip(x, cells, strict=True):
                 axes.plot([at, at], item.summary.ci95, color=line(i)["color"], linewidth=0.8)
     axes.set_xticks(range(len(values)), labels=values)
-    axes.set(xlabel=field, ylabel=quantity.name, xlim=(-0.4, len(values) - 0.6))
+    axes.set(xlabel=_with_unit(field), ylabel=quantity.name, xlim=(-0.4, len(values) - 0.6))
     if quantity.limits is not None:
         axes.set_ylim(-0.04, 1.04)
     axes.set_title(panel.title, loc="right")
@@ -133,5 +140,5 @@ def _heat(canvas: Canvas, axes: Axes, panel: Panel, fields: list[str], quantity:
             )  # fmt: skip
     axes.set_xticks(range(len(across)), labels=across)
     axes.set_yticks(range(len(up)), labels=up)
-    axes.set(xlabel=fields[0], ylabel=fields[1], title=panel.title)
+    axes.set(xlabel=_with_unit(fields[0]), ylabel=_with_unit(fields[1]), title=panel.title)
     canvas.colorbar(image, ax=axes, pad=0.02).set_label(quantity.name)

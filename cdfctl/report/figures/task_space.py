@@ -32,30 +32,45 @@ if TYPE_CHECKING:
 
 INSTANTS = 9
 CHORD = 0.05  # rad: joint motion between two points of a drawn path
+BESIDE, ABOVE_AND_BELOW = 2.3, 2.45  # cm: labels and bar of the strobe, and its title, label and legend
+LABELLED = 4
+"""Of so many obstacles the times are written, where there is room."""
 PLANS = 12
 """At most so many plans are drawn, evenly over the run."""
 
 
 def task_space(view: RunView) -> Part:
     """The strobe of a run of a planar arm."""
-    return Part("task-space", lambda width: 1.05 * width, lambda canvas, width: _draw(canvas, view), COLUMN)
+
+    def height(width: float) -> float:
+        low, high = extent(view, _picked(view))
+        across, up = high - low
+        return (width - BESIDE) * float(np.clip(up / across, 0.3, 2.0)) + ABOVE_AND_BELOW
+
+    return Part("task-space", height, lambda canvas, width: _draw(canvas, view), COLUMN)
 
 
 def _draw(canvas: Canvas, view: RunView) -> None:
     axes = canvas.subplots()
     canvas.suptitle(view.title().replace("; ", "\n", 1), x=0.01, ha="left", fontsize=7.5)
-    picked = np.unique(np.linspace(0, view.steps, INSTANTS).round().astype(int))
+    picked = _picked(view)
     draw_strobe(axes, view, picked)
     handles = draw_paths(axes, view)
     handles += draw_goal(axes, view)
     frame(axes, view, picked)
+    _label_times(axes, view, picked)
     canvas.legend(handles=handles, loc="outside lower center", ncols=5)
     if view.steps:
         _time_bar(canvas, axes, view)
 
 
-def draw_strobe(axes: Axes, view: RunView, picked: IntArray, *, times: bool = True) -> None:
-    """Arm and obstacles at the control steps ``picked``, the later the darker; obstacles with their time and arrow."""
+def _picked(view: RunView) -> IntArray:
+    """The control steps that are drawn."""
+    return np.unique(np.linspace(0, view.steps, INSTANTS).round().astype(int))
+
+
+def draw_strobe(axes: Axes, view: RunView, picked: IntArray) -> None:
+    """Arm and obstacles at the control steps ``picked``, the later the darker."""
     skeleton = Skeleton(view.robot)
     end = max(float(view.t[-1]), 1e-9)
     for k in picked:
@@ -67,8 +82,6 @@ def draw_strobe(axes: Axes, view: RunView, picked: IntArray, *, times: bool = Tr
                 style = {"facecolor": "none", "edgecolor": mixed("white", GREEN, 0.3 + 0.7 * share), "hatch": "xxxx"}
                 add_shape(axes, shape, pose, zorder=2.0 + share, **style)
     axes.plot(*skeleton.points(view.trajectory.q[:1])[0, 0], marker="s", color=BLACK, markersize=4.5, zorder=5)
-    if times:
-        _label_times(axes, view, picked)
 
 
 def shade(share: float) -> tuple[float, float, float]:
@@ -178,6 +191,14 @@ def dense(Q: Array) -> Array:
 
 def frame(axes: Axes, view: RunView, picked: IntArray) -> None:
     """Limits around all that the arm touches, and around the obstacles within its reach and a little more."""
+    low, high = extent(view, picked)
+    axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    grid(axes)
+
+
+def extent(view: RunView, picked: IntArray) -> tuple[Array, Array]:
+    """The least and the greatest x and y (2,) that are shown, m."""
     points = Skeleton(view.robot).points(view.trajectory.q)
     if view.goal is not None:
         points = np.concatenate([points, Skeleton(view.robot).points(view.goal[None, :])])
@@ -190,25 +211,37 @@ def frame(axes: Axes, view: RunView, picked: IntArray) -> None:
     near = near[np.linalg.norm(near - base, axis=1) < 1.25 * reach]
     size = min(max((radius_of(shape) for shape in view.motion.shapes), default=0.0) + 0.1 * reach, 0.4 * reach)
     seen = np.concatenate([points.reshape(-1, 2), near - size, near + size])  # the body, and its time beside it
-    low, high = seen.min(axis=0), seen.max(axis=0)
     pad = 0.12 * reach
-    axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
-    axes.set(xlim=(low[0] - pad, high[0] + pad), ylim=(low[1] - pad, high[1] + pad))
-    grid(axes)
+    return seen.min(axis=0) - pad, seen.max(axis=0) + pad
 
 
 def _label_times(axes: Axes, view: RunView, picked: IntArray) -> None:
-    """When the first obstacles were where they are drawn, at the first and the last instant, beside their way."""
-    for k in (picked[0], picked[-1])[: len(picked)]:
-        poses, twists = view.trajectory.obstacle_pose[k, :4], view.trajectory.obstacle_twist[k, :4]
-        for shape, pose, twist in zip(view.motion.shapes, poses, twists, strict=False):
+    """When the first obstacles were where they are first and last seen, beside their way, where there is room.
+
+    A label must be inside the frame as a whole, and clear of the others.
+    """
+    low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
+    half = np.array([0.07, 0.025]) * (high - low)  # of a label
+    taken: list[Array] = []
+    for i, shape in enumerate(view.motion.shapes[:LABELLED]):
+        poses = view.trajectory.obstacle_pose[picked, i]
+        seen = picked[((poses[:, :2] > low) & (poses[:, :2] < high)).all(axis=1)]
+        for k in dict.fromkeys(seen[[0, -1]].tolist() if len(seen) else ()):
+            twist = view.trajectory.obstacle_twist[k, i]
             speed = float(np.linalg.norm(twist[:2]))
             aside = np.array([twist[1], -twist[0]]) / speed if speed > 1e-9 else np.array([1.0, 0.0])
-            x, y = pose[:2] + (radius_of(shape) + 0.35) * aside
-            axes.text(
-                x, y, f"{view.t[k]:.1f} s", ha="center", va="center", fontsize=6.5, zorder=6, clip_on=True,
-                path_effects=[halo()],
-            )  # fmt: skip
+            origin, size = view.trajectory.obstacle_pose[k, i, :2], radius_of(shape)
+            for side in (aside, -aside):
+                place = np.clip(origin + (size + 1.3 * half) * side, low + half, high - half)
+                beside = np.linalg.norm((place - origin) / (size + half)) > 1.0
+                if beside and all((np.abs(place - other) > 2.0 * half).any() for other in taken):
+                    taken.append(place)
+                    x, y = place.tolist()
+                    axes.text(
+                        x, y, f"{view.t[k]:.1f} s", ha="center", va="center", fontsize=6.5, zorder=6,
+                        path_effects=[halo()],
+                    )  # fmt: skip
+                    break
 
 
 def _time_bar(canvas: Canvas, axes: Axes, view: RunView) -> None:

@@ -37,6 +37,9 @@ PANEL = 4.3  # cm, height of a panel
 MOST_LABELLED = 7
 """With more obstacles than this, their lines are grey but for the least of all."""
 
+CONTACT: dict[str, Any] = {"color": VERMILION, "linewidth": 0.6, "linestyle": "-"}
+"""The line at which there is contact: solid, for the second of some series is dashed in the same colour."""
+
 
 class Panel(NamedTuple):
     """One panel: its axis, and what draws its content."""
@@ -94,7 +97,7 @@ def panels(view: RunView) -> Iterator[Panel]:
         of = unit[fields[0]]
         yield Panel(f"V [{of}]", lambda axes: lyapunov(axes, view))
         yield Panel(f"slack δ [{of}/s]", lambda axes: _steps(axes, view, arrays.slack[:, None], [""]))
-    yield Panel(f"velocity u [{_joint_unit(view)}/s]", lambda axes: velocity(axes, view))
+    yield Panel(f"velocity u [{_joint_unit(view, '/s')}]", lambda axes: velocity(axes, view))
     yield Panel(f"position q [{_joint_unit(view)}]", lambda axes: position(axes, view))
     if _common(view.robot.lower, view.robot.upper) is None:
         yield Panel(f"room to a limit [{_joint_unit(view)}]", lambda axes: room(axes, view))
@@ -106,7 +109,7 @@ def barrier(axes: Axes, view: RunView, h: Array) -> None:
     _obstacle_lines(axes, view, view.t[:-1], h)
     axes.axhline(0.0, color=BLACK, linewidth=0.8, linestyle="-")
     if variant_named(view.scenario.controller.variant).safety != "hyperplane" and view.margin > 0.0:
-        axes.axhline(-view.margin, color=VERMILION, linewidth=0.8, linestyle="--")
+        axes.axhline(-view.margin, **CONTACT)
     finite = h[np.isfinite(h)]
     if finite.size:
         low, high = min(float(finite.min()), -view.margin), max(_ceiling(h), view.margin)
@@ -118,7 +121,7 @@ def clearance(axes: Axes, view: RunView) -> None:
     """Distance of every obstacle on the judge's geometry, and the least of the run, between the steps too."""
     times, found = view.clearance
     _obstacle_lines(axes, view, times, found)
-    axes.axhline(0.0, color=VERMILION, linewidth=0.8, linestyle="--")
+    axes.axhline(0.0, **CONTACT)
     if found.shape[1] > MOST_LABELLED and np.isfinite(found).any():
         top = max(_ceiling(found), 0.1)
         axes.set_ylim(min(0.0, float(found.min())) - 0.06 * top, 1.06 * top)
@@ -179,7 +182,8 @@ def position(axes: Axes, view: RunView) -> None:
     for i, q in enumerate(view.trajectory.q.T):
         axes.plot(view.t, q, label=labels[i], **line(i))
         if view.goal is not None:
-            axes.plot(view.t[-1], view.goal[i], marker=4, color=line(i)["color"], markersize=4, clip_on=False, zorder=5)
+            # Its tip at the end of the axis and its body inside: outside, half of it would be off the page.
+            axes.plot(view.t[-1], view.goal[i], marker=5, color=line(i)["color"], markersize=4, zorder=5)
     legend_above(axes, MOST_SERIES)
     if _common(view.robot.lower, view.robot.upper) is not None:
         _limits(axes, view.robot.lower, view.robot.upper)
@@ -234,9 +238,10 @@ def _joint_labels(view: RunView) -> list[str]:
     return [f"joint {i + 1}" if view.robot.n < 4 or i == 0 else str(i + 1) for i in range(view.robot.n)]
 
 
-def _joint_unit(view: RunView) -> str:
+def _joint_unit(view: RunView, a_second: str = "") -> str:
     slides = view.robot.prismatic
-    return "m" if slides.all() else "rad or m" if slides.any() else "rad"
+    units = ["m"] if slides.all() else ["rad", "m"] if slides.any() else ["rad"]
+    return " or ".join(f"{unit}{a_second}" for unit in units)
 
 
 def mark_steps(axes: Axes, view: RunView) -> None:
@@ -255,11 +260,11 @@ def _marks(view: RunView) -> list[Any]:
     handles: list[Any] = [Line2D([], [], color=GREY, linewidth=0.9, linestyle="--", label="limit")]
     if len(view.motion):
         handles.append(Line2D([], [], color=BLACK, linewidth=0.8, label="h = 0: at the margin"))
-        handles.append(Line2D([], [], color=VERMILION, linewidth=0.8, linestyle="--", label="contact with an obstacle"))
+        handles.append(Line2D([], [], **CONTACT, label="contact with an obstacle"))
     if view.document.get("collision_time_s") is not None:
         handles.append(Line2D([], [], color=VERMILION, linewidth=1.0, linestyle="-.", label="time of first contact"))
     if view.trajectory.infeasible.any():
         handles.append(Patch(facecolor=FAINT, edgecolor=GREY, hatch="////", linewidth=0.0, label="infeasible step"))
     if view.goal is not None:
-        handles.append(Line2D([], [], color=BLACK, marker=4, markersize=4, linestyle="none", label="goal"))
+        handles.append(Line2D([], [], color=BLACK, marker=5, markersize=4, linestyle="none", label="goal"))
     return handles

@@ -94,7 +94,10 @@ def test_two_swept_fields_make_a_heat_map(grid):
     (rates,) = [axes.images[0].get_array() for axes in figure.axes if axes.images and "1.00" in _numbers(axes)]
     np.testing.assert_array_equal(rates, [[0.0, 0.25, 0.5], [0.75, 1.0, 1.0]])
     axes = figure.axes[0]
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("controller.alpha", "controller.margin")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == (
+        "controller.alpha [1/s]",
+        "controller.margin [m (SDF), rad (CDF)]",
+    )
     assert [tick.get_text() for tick in axes.get_xticklabels()] == ["1", "2", "4"]
     assert [tick.get_text() for tick in axes.get_yticklabels()] == ["0.05", "0.1"]
 

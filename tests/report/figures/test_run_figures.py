@@ -89,11 +89,13 @@ def test_the_curves_are_the_arrays(full_run):
 
 
 def test_the_clearance_is_that_of_the_closed_form(small_run):
-    """Of two segments of 2 m and the disc."""
+    """Of two segments of 2 m and the disc, at the control steps and between them."""
     times, found = small_run.clearance
-    np.testing.assert_allclose(times, small_run.t)
-    for k, q in enumerate(small_run.trajectory.q):
-        centre = small_run.trajectory.obstacle_pose[k, 0, :2]
+    assert set(small_run.t.round(9)) < set(times.round(9))
+    for k in range(0, len(times), 7):
+        now = times[k]
+        q = np.array([np.interp(now, small_run.t, column) for column in small_run.trajectory.q.T])
+        centre = [np.interp(now, small_run.t, column) for column in small_run.trajectory.obstacle_pose[:, 0, :2].T]
         elbow = 2.0 * np.array([np.cos(q[0]), np.sin(q[0])])
         tip = elbow + 2.0 * np.array([np.cos(q.sum()), np.sin(q.sum())])
         along = [np.linspace(a, b, 4001) for a, b in ((np.zeros(2), elbow), (elbow, tip))]
@@ -188,7 +190,7 @@ def test_a_part_of_a_run_has_the_moments_of_its_plant_until_then(small_run):
 
 def test_the_instants_are_start_least_clearance_and_end(small_run):
     times, found = small_run.clearance
-    nearest = int(np.argmin(found[:, 0]))
+    nearest = int(np.argmin(np.abs(small_run.t - times[np.argmin(found[:, 0])])))
     expected = {0, nearest if 0 < nearest < small_run.steps else small_run.steps // 2, small_run.steps}
     assert default_instants(small_run) == sorted(expected)
     assert len(times) <= MOST_INSTANTS
@@ -234,3 +236,31 @@ def test_many_obstacles_share_one_line(small_run):
     figure = figure_of([time_course(replace(small_run, trajectory=wide, motion=motion))])
     (least,) = [line for line in figure.axes[0].lines if line.get_label() == f"least of {m} obstacles"]
     np.testing.assert_array_equal(least.get_ydata(), arrays.h[:, 0])
+
+
+def test_times_and_goals_are_inside_what_is_drawn(small_run, arm_run):
+    """A text or marker that crosses the frame is cut, and one that crosses the page as well."""
+    strobe = figure_of([task_space(small_run)])
+    strobe.draw_without_rendering()
+    axes = strobe.axes[0]
+    frame = axes.get_window_extent()
+    times = [text for text in axes.texts if text.get_text().endswith(" s")]
+    assert [text.get_text() for text in times] == ["0.0 s", "1.5 s"]
+    for text in times:
+        box = text.get_window_extent()
+        assert frame.x0 <= box.x0
+        assert box.x1 <= frame.x1
+        assert frame.y0 <= box.y0
+        assert box.y1 <= frame.y1
+    course = figure_of([time_course(arm_run)])
+    course.draw_without_rendering()
+    goals = [line for axes in course.axes for line in axes.lines if line.get_marker() == 5]
+    assert len(goals) == 7
+    assert all(line.get_clip_on() for line in goals)
+
+
+def test_the_second_unit_of_a_velocity_is_a_velocity(arm_run):
+    slides = arm_run.robot.prismatic.copy()
+    slides[3] = True
+    view = replace(arm_run, robot=replace(arm_run.robot, prismatic=slides))
+    assert "velocity u [rad/s or m/s]" in [panel.label for panel in panels(view)]

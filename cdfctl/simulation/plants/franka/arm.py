@@ -229,7 +229,8 @@ def load_franky() -> Any:
         import franky
     except ImportError as error:
         raise MissingError(
-            f"the plant franka needs franky, which cannot be imported: {told(error)}", "pip install 'cdfctl[franka]'"
+            f"the plant franka needs franky, which cannot be imported: {told(error)}",
+            "python -m pip install 'cdfctl[franka]'",
         ) from None
     return franky
 
