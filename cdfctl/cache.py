@@ -1,9 +1,13 @@
-"""The one place on disk where cdfctl keeps what it can make again: compiled kernels, contact tables."""
+"""The one place on disk where cdfctl keeps what it can make again: compiled kernels, hulls, contact tables."""
 
 from __future__ import annotations
 
 import os
+import tempfile
+from contextlib import suppress
 from pathlib import Path
+
+from cdfctl.reading import drafted
 
 
 def cache_dir() -> Path:
@@ -23,3 +27,14 @@ def writable_dir(path: Path) -> Path | None:
     except OSError:
         return None
     return path if os.access(path, os.W_OK | os.X_OK) else None
+
+
+def keep(path: Path, data: bytes) -> None:
+    """Write ``data`` to ``path`` in the cache, whole or not at all; where that fails, nothing is kept."""
+    if writable_dir(path.parent) is None:
+        return
+    with suppress(OSError):
+        handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")  # a name of its own for every writer
+        os.close(handle)
+        with drafted(path, Path(name)) as draft:
+            draft.write_bytes(data)
