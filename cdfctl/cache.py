@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
+import time
 from contextlib import suppress
 from pathlib import Path
 
 from cdfctl.reading import drafted
+
+KEPT = 4  # folders of one kind
+DAY = 86400.0  # s
 
 
 def cache_dir() -> Path:
@@ -27,6 +32,22 @@ def writable_dir(path: Path) -> Path | None:
     except OSError:
         return None
     return path if os.access(path, os.W_OK | os.X_OK) else None
+
+
+def dir_of_this_version(path: Path, alike: str) -> Path | None:
+    """``path``, marked as used now, as :func:`writable_dir`. Those of other versions go, but for the last few used.
+
+    ``alike`` is the pattern of all their names. One used within a day may be in use still, and stays.
+    """
+    folder = writable_dir(path)
+    if folder is not None:
+        with suppress(OSError):
+            os.utime(folder)
+            used = sorted(((other.stat().st_mtime, other) for other in folder.parent.glob(alike)), reverse=True)
+            for when, other in used[KEPT:]:
+                if time.time() - when > DAY:
+                    shutil.rmtree(other, ignore_errors=True)
+    return folder
 
 
 def keep(path: Path, data: bytes) -> None:
