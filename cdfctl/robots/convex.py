@@ -27,11 +27,15 @@ FLATNESS = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class ConvexSet:
-    """``conv(vertices) (+) disc (+) ball``: ``vertices`` (k, 3), ``disc`` and ``radius`` in m, in the shape's frame."""
+    """``conv(vertices) (+) disc (+) ball``: ``vertices`` (k, 3), ``disc`` and ``radius`` in m, in the shape's frame.
+
+    ``faces`` (t, 3) are those of :func:`convex_hull`, None where they are not known.
+    """
 
     vertices: Array
     disc: float = 0.0
     radius: float = 0.0
+    faces: IntArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +78,8 @@ def convex_sets(shape: Shape) -> tuple[ConvexSet, ...]:
         case Cylinder(radius, length):
             return (ConvexSet(segment_vertices(length), disc=radius),)
         case ConvexMesh():
-            return (ConvexSet(convex_hull(shape.vertices)[0]),)
+            vertices, faces = convex_hull(shape.vertices)
+            return (ConvexSet(vertices, faces=faces),)
         case PointCloud():
             return tuple(ConvexSet(point[None, :], radius=shape.radius) for point in shape.points)
 

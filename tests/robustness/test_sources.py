@@ -14,8 +14,8 @@ UNSAFE_CALLS = {
     "eval", "exec", "compile", "__import__", "os.system", "os.popen", "yaml.load", "yaml.load_all", "yaml.full_load",
     "yaml.unsafe_load", "torch.load", "joblib.load", "np.save", "np.fromfile",
 }  # fmt: skip
-# They look how old files of the cache are, and a wrong clock costs a compilation.
-CLOCK = {"cache.py", "fields/kernel/jit.py"}
+# It looks how old its folders are, and a wrong clock costs a compilation.
+CLOCK = {"cache.py"}
 
 
 def trees() -> Iterator[tuple[str, ast.AST]]:
