@@ -62,7 +62,7 @@ def merge_bodies(file: RobotFile, bodies: list[Body]) -> list[Body]:
         if len({body.joint for body in members}) > 1 or any(b.shape.disc or b.shape.radius for b in members):
             raise InputError(f"{where}: only boxes and meshes that move together can be merged")
         points = [b.shape.vertices @ b.placement.rotation.T + b.placement.translation for b in members]
-        vertices, faces = convex_hull(np.concatenate(points))
+        vertices, faces = convex_hull(np.concatenate(points), keep=True)
         first = members[0]
         hull = Body(
             name, first.joint, first.frame, _identity(), coal_convex(vertices, faces), ConvexSet(vertices), faces

@@ -73,10 +73,10 @@ def convex_form(geometry: Any) -> tuple[Any, ConvexSet, IntArray]:
     if isinstance(geometry, coal.Cylinder):
         return geometry, ConvexSet(segment_vertices(2.0 * geometry.halfLength), disc=geometry.radius), none
     if isinstance(geometry, coal.Box):
-        vertices, faces = convex_hull(box_vertices(2.0 * geometry.halfSide))
+        vertices, faces = convex_hull(box_vertices(2.0 * geometry.halfSide), keep=True)
         return geometry, ConvexSet(vertices), faces
     points = np.array(geometry.points() if isinstance(geometry, coal.Convex) else geometry.vertices())
-    vertices, faces = convex_hull(points)
+    vertices, faces = convex_hull(points, keep=True)
     return coal_convex(vertices, faces), ConvexSet(vertices), faces
 
 

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdfctl.errors import InputError
+from cdfctl.robots.kept_hulls import Facets, kept_facets
 from cdfctl.types import Array, Box, Capsule, ConvexMesh, Cylinder, IntArray, PointCloud, Shape, Sphere
 
 # A point set whose extent along a direction is below this share of its greatest extent counts as flat there.
@@ -26,11 +27,15 @@ FLATNESS = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class ConvexSet:
-    """``conv(vertices) (+) disc (+) ball``: ``vertices`` (k, 3), ``disc`` and ``radius`` in m, in the shape's frame."""
+    """``conv(vertices) (+) disc (+) ball``: ``vertices`` (k, 3), ``disc`` and ``radius`` in m, in the shape's frame.
+
+    ``faces`` (t, 3) are those of :func:`convex_hull`, None where they are not known.
+    """
 
     vertices: Array
     disc: float = 0.0
     radius: float = 0.0
+    faces: IntArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +78,8 @@ def convex_sets(shape: Shape) -> tuple[ConvexSet, ...]:
         case Cylinder(radius, length):
             return (ConvexSet(segment_vertices(length), disc=radius),)
         case ConvexMesh():
-            return (ConvexSet(convex_hull(shape.vertices)[0]),)
+            vertices, faces = convex_hull(shape.vertices)
+            return (ConvexSet(vertices, faces=faces),)
         case PointCloud():
             return tuple(ConvexSet(point[None, :], radius=shape.radius) for point in shape.points)
 
@@ -88,11 +94,14 @@ def segment_vertices(length: float) -> Array:
     return np.array([[0.0, 0.0, -0.5 * length], [0.0, 0.0, 0.5 * length]])
 
 
-def convex_hull(points: Array) -> tuple[Array, IntArray]:
+def convex_hull(points: Array, *, keep: bool = False) -> tuple[Array, IntArray]:
     """Vertices (k, 3) and faces (t, 3) of the hull of ``points`` (p, 3), in an order that depends on the set only.
 
     Vertices are sorted by x, then y, then z. Faces are triangles, counter-clockwise from outside. Points that all lie
     in a plane, on a line or in one place give the corners of the polygon, the two ends or the one point, and no faces.
+
+    With ``keep`` a hull with faces is looked for in the user cache, and put there: for the bodies of a robot, which are
+    the same at every start. The answer is the same bit for bit.
 
     Raises:
         InputError: a point is not finite, or there is none.
@@ -104,18 +113,20 @@ def convex_hull(points: Array) -> tuple[Array, IntArray]:
     spread, axes = np.linalg.svd(centred, full_matrices=False)[1:]
     rank = int(np.sum(spread > FLATNESS * max(float(spread[0]), np.finfo(np.float64).tiny)))
     if rank == 3:
-        return _solid_hull(points)
+        corners, faces = kept_facets(points, _facets) if keep else _facets(points)
+        return points[corners], faces
     if rank == 2:
-        keep = _qhull(centred @ axes[:2].T)[0]
+        corners = np.sort(_qhull(centred @ axes[:2].T)[0])
     elif rank == 1:
         along = centred @ axes[0]
-        keep = np.array([int(np.argmin(along)), int(np.argmax(along))])
+        corners = np.sort([np.argmin(along), np.argmax(along)])
     else:
-        keep = np.array([0])
-    return points[np.sort(keep)], np.zeros((0, 3), dtype=np.int64)
+        corners = np.array([0])
+    return points[corners], np.zeros((0, 3), dtype=np.int64)
 
 
-def _solid_hull(points: Array) -> tuple[Array, IntArray]:
+def _facets(points: Array) -> Facets:
+    """The hull of sorted points that span a volume."""
     corners, triangles, normals = _qhull(points)
     corners = np.sort(corners)  # points are sorted, so the vertices stay so
     faces = np.searchsorted(corners, triangles)
@@ -125,7 +136,7 @@ def _solid_hull(points: Array) -> tuple[Array, IntArray]:
     faces[inward] = faces[inward][:, ::-1]
     first = np.argmin(faces, axis=1)  # each face begins with its least vertex, faces sorted: one order for one hull
     faces = np.take_along_axis(faces, (first[:, None] + np.arange(3)) % 3, axis=1)
-    return vertices, faces[np.lexsort(faces.T[::-1])].astype(np.int64)
+    return Facets(corners, faces[np.lexsort(faces.T[::-1])].astype(np.int64))
 
 
 def _qhull(points: Array) -> tuple[IntArray, IntArray, Array]:

@@ -18,15 +18,13 @@ import hashlib
 import itertools
 import json
 import math
-import os
-import tempfile
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from cdfctl.cache import cache_dir, writable_dir
+from cdfctl.cache import cache_dir, keep
 from cdfctl.reading import read_json
 from cdfctl.robots.coal_geometry import exact_request
 from cdfctl.robots.robot import Robot
@@ -74,7 +72,7 @@ def self_pairs(robot: Robot) -> SelfPairs:
     known = _read(path, key, candidates)
     if known is None:
         known = find_pairs(robot, candidates)
-        _write(path, key, known)
+        keep(path, json.dumps({"key": key, **known._asdict()}).encode())
     return known
 
 
@@ -159,16 +157,3 @@ def _read(path: Path, key: str, candidates: tuple[Pair, ...]) -> SelfPairs | Non
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return found if sorted(itertools.chain(*found)) == sorted(candidates) else None
-
-
-def _write(path: Path, key: str, pairs: SelfPairs) -> None:
-    """Keep ``pairs``; where that cannot be written, the next process finds them again."""
-    if writable_dir(path.parent) is None:
-        return
-    try:
-        handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            json.dump({"key": key, **pairs._asdict()}, file)
-        Path(name).replace(path)
-    except OSError:
-        return

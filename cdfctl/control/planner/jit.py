@@ -12,7 +12,7 @@ from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 
-from cdfctl.cache import cache_dir, writable_dir
+from cdfctl.cache import cache_dir, dir_of_this_version
 from cdfctl.fields.kernel import jit
 
 P = ParamSpec("P")
@@ -39,4 +39,4 @@ def _compiled(function: Callable[P, T], *, forceinline: bool) -> Callable[P, T]:
 @cache
 def _cache() -> Path | None:
     digest = jit.digest_of(Path(jit.__file__).parent, Path(__file__).parent)
-    return writable_dir(cache_dir() / "kernels" / f"planner-{digest}")
+    return dir_of_this_version(cache_dir() / "kernels" / f"planner-{digest}", "planner-*")

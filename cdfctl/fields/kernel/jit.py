@@ -14,10 +14,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import os
 import platform
-import shutil
-import time
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -25,13 +22,10 @@ from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 
-from cdfctl.cache import cache_dir, writable_dir
+from cdfctl.cache import cache_dir, dir_of_this_version
 
 P = ParamSpec("P")
 T = TypeVar("T")
-
-KEPT = 4  # folders of machine code, each some 20 MB
-DAY = 86400.0  # s
 
 OPTIONS: dict[str, Any] = {
     "nogil": True,
@@ -125,17 +119,4 @@ def _plain_integers(compiled: Any) -> Any:
 @cache
 def _kernel_cache() -> Path | None:
     """The folder of the machine code of these sources. Those of other sources go, but for the last few used."""
-    folder = writable_dir(cache_dir() / "kernels" / digest_of(Path(__file__).parent))
-    if folder is not None:
-        with contextlib.suppress(OSError):
-            os.utime(folder)
-            _forget_old(folder.parent)
-    return folder
-
-
-def _forget_old(kernels: Path) -> None:
-    """Remove all but the newest folders; one used within a day may be in use still, and stays."""
-    used = sorted(((folder.stat().st_mtime, folder) for folder in kernels.glob("[0-9a-f]" * 16)), reverse=True)
-    for when, folder in used[KEPT:]:
-        if time.time() - when > DAY:
-            shutil.rmtree(folder, ignore_errors=True)
+    return dir_of_this_version(cache_dir() / "kernels" / digest_of(Path(__file__).parent), "[0-9a-f]" * 16)

@@ -70,7 +70,8 @@ class ConvexSets(Struct):
 
 
 class ConvexSetLike(Protocol):
-    """What :func:`pack` reads of a set: ``vertices`` (v, 3), ``disc``, ``radius``."""
+    """What :func:`pack` reads of a set: ``vertices`` (v, 3), ``disc``, ``radius``, and ``faces`` (t, 3), triangles of
+    the hull of the vertices, none where it is flat; None where they are not known."""
 
     @property
     def vertices(self) -> Array: ...
@@ -78,6 +79,8 @@ class ConvexSetLike(Protocol):
     def disc(self) -> float: ...
     @property
     def radius(self) -> float: ...
+    @property
+    def faces(self) -> IntArray | None: ...
 
 
 def pack(sets: Sequence[ConvexSetLike]) -> ConvexSets:
@@ -98,7 +101,7 @@ def pack(sets: Sequence[ConvexSetLike]) -> ConvexSets:
         record["lower"], record["upper"], record["centre"] = lower, upper, 0.5 * (lower + upper)
         record["reach"] = np.hypot(np.hypot(x, y) + s.disc, z).max()
         if count > SCAN_LIMIT:
-            degrees, adjacent = _hull_edges(points)
+            degrees, adjacent = _hull_edges(count, _triangles(points) if s.faces is None else s.faces)
             cells = 8 if count < 400 else 16 if count < 2000 else 32
             record["table"], record["cells"] = filled, cells
             degree[first : first + count] = degrees
@@ -115,22 +118,27 @@ def pack(sets: Sequence[ConvexSetLike]) -> ConvexSets:
     )
 
 
-def _hull_edges(points: Array) -> tuple[IntArray, IntArray]:
-    """Number of neighbours of each vertex on the hull of ``points``, and the neighbours one after another.
-
-    A flat set has no hull in space; then every vertex is the neighbour of every other.
-    """
+def _triangles(points: Array) -> IntArray:
+    """Those of the hull of ``points``; a flat set has no hull in space, and none."""
     from scipy.spatial import ConvexHull, QhullError
 
-    count = len(points)
     try:
-        triangles = ConvexHull(points).simplices
+        return np.asarray(ConvexHull(points).simplices, dtype=np.int64)
     except QhullError:
-        i, j = np.nonzero(~np.eye(count, dtype=bool))
-        pairs = np.stack([i, j], axis=1)
-    else:
+        return np.zeros((0, 3), dtype=np.int64)
+
+
+def _hull_edges(count: int, triangles: IntArray) -> tuple[IntArray, IntArray]:
+    """Number of neighbours of each of the vertices, and the neighbours one after another.
+
+    Without triangles every vertex is the neighbour of every other.
+    """
+    if len(triangles):
         pairs = np.concatenate([triangles[:, [i, j]] for i in range(3) for j in range(3) if i != j])
         pairs = np.unique(pairs, axis=0)
+    else:
+        i, j = np.nonzero(~np.eye(count, dtype=bool))
+        pairs = np.stack([i, j], axis=1)
     return np.bincount(pairs[:, 0], minlength=count).astype(np.int64), pairs[:, 1].astype(np.int64)
 
 

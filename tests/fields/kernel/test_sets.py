@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdfctl.fields.kernel.sets import SCAN_LIMIT, pack, support
-from cdfctl.robots.convex import ConvexSet
+from cdfctl.robots.convex import ConvexSet, convex_hull
 
 
 def directions(count: int) -> np.ndarray:
@@ -60,3 +60,14 @@ def test_bounds_hold_the_core(geometry):
 
 def test_no_sets_at_all():
     assert len(pack([]).info) == 0
+
+
+@pytest.mark.parametrize("decimals", [1, 9])
+def test_faces_that_are_known_serve_as_those_found(decimals):
+    points = np.random.default_rng(2).normal(size=(300, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    vertices, faces = convex_hull(points.round(decimals))  # rounded: sides with many corners
+    assert len(vertices) > SCAN_LIMIT
+    sets = pack([ConvexSet(vertices, faces=faces)])
+    for n in directions(500):
+        assert np.dot(support(sets, 0, tuple(n)), n) == pytest.approx((vertices @ n).max(), abs=1e-12)
