@@ -5,11 +5,13 @@ from __future__ import annotations
 import sys
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from tempfile import gettempdir
 
 from cdfctl import __version__
+from cdfctl.cli.console import note
 from cdfctl.errors import CdfctlError
 
 BUG = 70
@@ -17,45 +19,45 @@ BUG = 70
 
 def report_failure(error: CdfctlError, *, debug: bool) -> int:
     """Print a failure the user can mend, and return its exit status."""
-    if debug:
-        traceback.print_exception(error)
+    _trace(error, debug)
     text = str(error)
     # An error in a file opens with the file's name, as compilers print it; the rest say who is speaking.
-    print(text if ": error: " in text.partition("\n")[0] else f"cdfctl: error: {text}", file=sys.stderr)
+    note(text if ": error: " in text.partition("\n")[0] else f"cdfctl: error: {text}")
     return error.exit_status
 
 
 def report_usage(error: Exception, *, debug: bool) -> int:
     """Print what is wrong with the command line, and return status 2."""
-    if debug:
-        traceback.print_exception(error)
+    _trace(error, debug)
     message = error.format_message() if hasattr(error, "format_message") else str(error)
     context = getattr(error, "ctx", None)
     command = context.command_path if context is not None else "cdfctl"
-    print(f"cdfctl: error: {message}\n  hint   {command} --help", file=sys.stderr)
+    note(f"cdfctl: error: {message}\n  hint   {command} --help")
     return CdfctlError.exit_status
 
 
 def report_bug(error: Exception, arguments: Sequence[str], *, debug: bool) -> int:
     """Print one line that says where the traceback was written, and return status 70."""
-    if debug:
-        traceback.print_exception(error)
+    _trace(error, debug)
     what = " ".join(f"{type(error).__name__}: {error}".split())
     if len(what) > 200:
         what = what[:200] + "…"
     text = f"cdfctl {__version__}, Python {sys.version}\narguments: {list(arguments)!r}\n\n"
     log = _write_log(text + "".join(traceback.format_exception(error)))
     where = f"the log is {log}" if log is not None else "no log could be written; --debug shows the traceback"
-    print(f"cdfctl: this is a bug of cdfctl ({what}); {where}", file=sys.stderr)
+    note(f"cdfctl: this is a bug of cdfctl ({what}); {where}")
     return BUG
+
+
+def _trace(error: Exception, debug: bool) -> None:
+    if debug:
+        note("".join(traceback.format_exception(error)).rstrip())
 
 
 def _write_log(text: str) -> Path | None:
     """Write ``text`` to a new file in the cache folder, or else in the system's temporary folder."""
-    from cdfctl.cache import cache_dir
-
     name = time.strftime("bug-%Y%m%d-%H%M%S.log")
-    for folder in (cache_dir() / "log", Path(gettempdir())):
+    for folder in _log_folders():
         try:
             folder.mkdir(parents=True, exist_ok=True)
             path = folder / name
@@ -64,3 +66,12 @@ def _write_log(text: str) -> Path | None:
             continue
         return path
     return None
+
+
+def _log_folders() -> Iterator[Path]:
+    from cdfctl.cache import cache_dir
+
+    with suppress(CdfctlError):
+        yield cache_dir() / "log"
+    with suppress(OSError):
+        yield Path(gettempdir())

@@ -5,6 +5,7 @@ Heavy imports wait until a command needs them: ``cdfctl --help`` imports neither
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from typing import Annotated
@@ -13,9 +14,9 @@ import typer
 
 from cdfctl import __version__
 from cdfctl.cli import bench, build_cdf, check, doctor, options, plot, robots, run, scenarios, schema, view
-from cdfctl.cli.console import abandon_stdout
+from cdfctl.cli.console import abandon, note, open_streams
 from cdfctl.cli.failures import report_bug, report_failure, report_usage
-from cdfctl.errors import CdfctlError
+from cdfctl.errors import CdfctlError, InputError
 
 # What Typer raises for a bad command line. It does not export this class, only the class two below it.
 CommandLineError: type[Exception] = typer.BadParameter.__mro__[2]
@@ -65,6 +66,7 @@ def _root(
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status; nothing but the interpreter's own end escapes from here."""
     words = list(sys.argv[1:] if arguments is None else arguments)
+    open_streams()
     debug = "--debug" in words  # looked for here, because an error may come before the options are read
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
@@ -78,10 +80,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (KeyboardInterrupt, typer.Abort) as error:
         if isinstance(error.__cause__, EOFError):  # Typer takes it for the end of what someone types
             return report_bug(error.__cause__, words, debug=debug)
-        print("cdfctl: interrupted", file=sys.stderr)
+        note("cdfctl: interrupted")
         return INTERRUPTED
     except BrokenPipeError:
-        abandon_stdout()  # the reader has gone (`cdfctl schema | head`): say nothing
+        abandon(sys.stdout)  # the reader has gone (`cdfctl schema | head`): say nothing
         return CdfctlError.exit_status
     except Exception as error:  # the one place: whatever else escapes is a bug, and a bug is one line and a log
+        if isinstance(error, FileNotFoundError) and not _is_somewhere():
+            return report_failure(InputError("the current folder is no longer there", "cd to another"), debug=debug)
         return report_bug(error, words, debug=debug)
+
+
+def _is_somewhere() -> bool:
+    try:
+        return bool(os.getcwd())
+    except FileNotFoundError:
+        return False

@@ -14,7 +14,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from cdfctl.errors import InputError
+from cdfctl.errors import InputError, printable
 
 Path = tuple[str | int, ...]
 
@@ -56,10 +56,10 @@ class Problem:
 
     def __str__(self) -> str:
         place = self.origin or self.file
-        message, field, hint = (_clean(text or "") for text in (self.message, self.field, self.hint))
+        message, field, hint = (printable(text or "", "") for text in (self.message, self.field, self.hint))
         if self.origin is None and self.line is not None:
             place = f"{self.file}:{self.line}:{self.column}"
-        lines = [f"{_clean(place)}: error: {message}"]
+        lines = [f"{printable(place, '')}: error: {message}"]
         if field:
             lines.append(f"  field  {field}")
         if hint:
@@ -98,11 +98,6 @@ class ScenarioErrors(InputError):  # noqa: N818  the plural says that it carries
 
     def __reduce__(self) -> tuple[type[ScenarioErrors], tuple[list[Problem], str]]:
         return type(self), (self.problems, self.file)
-
-
-def _clean(text: str) -> str:
-    """Without control characters: what a file holds must not steer the terminal."""
-    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 def path_text(path: Path) -> str:
