@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import sys
 import time
 import traceback
@@ -12,9 +14,11 @@ from tempfile import gettempdir
 
 from cdfctl import __version__
 from cdfctl.cli.console import note
-from cdfctl.errors import CdfctlError
+from cdfctl.errors import CdfctlError, InputError
 
 BUG = 70
+
+SYSTEM = {errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.ENOSPC, errno.EMFILE, errno.ENFILE}
 
 
 def report_failure(error: CdfctlError, *, debug: bool) -> int:
@@ -34,6 +38,28 @@ def report_usage(error: Exception, *, debug: bool) -> int:
     command = context.command_path if context is not None else "cdfctl"
     note(f"cdfctl: error: {message}\n  hint   {command} --help")
     return CdfctlError.exit_status
+
+
+def failure_of_system(error: Exception) -> InputError | None:
+    """What the operating system refuses whatever we ask it for, as a failure the user can mend; None for other errors.
+
+    Names that are too long come from every option that names a file, and are not looked for at each of them.
+    """
+    if not isinstance(error, OSError):
+        return None
+    if isinstance(error, FileNotFoundError) and not _is_somewhere():
+        return InputError("the current folder is no longer there", "cd to another")
+    if error.errno in SYSTEM:
+        what = error.filename if error.filename is not None else "the system"
+        return InputError(f"{what}: {error.strerror}")
+    return None
+
+
+def _is_somewhere() -> bool:
+    try:
+        return bool(os.getcwd())
+    except FileNotFoundError:
+        return False
 
 
 def report_bug(error: Exception, arguments: Sequence[str], *, debug: bool) -> int:

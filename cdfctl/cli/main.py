@@ -5,7 +5,6 @@ Heavy imports wait until a command needs them: ``cdfctl --help`` imports neither
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Sequence
 from typing import Annotated
@@ -15,8 +14,8 @@ import typer
 from cdfctl import __version__
 from cdfctl.cli import bench, build_cdf, check, doctor, options, plot, robots, run, scenarios, schema, view
 from cdfctl.cli.console import abandon, note, open_streams
-from cdfctl.cli.failures import report_bug, report_failure, report_usage
-from cdfctl.errors import CdfctlError, InputError
+from cdfctl.cli.failures import failure_of_system, report_bug, report_failure, report_usage
+from cdfctl.errors import CdfctlError
 
 # What Typer raises for a bad command line. It does not export this class, only the class two below it.
 CommandLineError: type[Exception] = typer.BadParameter.__mro__[2]
@@ -86,13 +85,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
         abandon(sys.stdout)  # the reader has gone (`cdfctl schema | head`): say nothing
         return CdfctlError.exit_status
     except Exception as error:  # the one place: whatever else escapes is a bug, and a bug is one line and a log
-        if isinstance(error, FileNotFoundError) and not _is_somewhere():
-            return report_failure(InputError("the current folder is no longer there", "cd to another"), debug=debug)
-        return report_bug(error, words, debug=debug)
-
-
-def _is_somewhere() -> bool:
-    try:
-        return bool(os.getcwd())
-    except FileNotFoundError:
-        return False
+        failure = failure_of_system(error)
+        return report_bug(error, words, debug=debug) if failure is None else report_failure(failure, debug=debug)

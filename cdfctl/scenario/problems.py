@@ -27,7 +27,7 @@ DEEPEST = 16
 WIDTH = 100
 """Characters of a line that an excerpt shows."""
 
-_STEP = re.compile(r"\.?(?P<key>[^.\[\]=\s]+)|\[(?P<index>\d+)\]")
+_STEP = re.compile(r"\.?(?P<key>[^.\[\]=\s]+)|\[(?P<index>[0-9]{1,9})\]")
 
 
 @dataclass(frozen=True)
@@ -123,6 +123,6 @@ def parse_path(text: str) -> Path:
             break
         path.append(match["key"] if match["key"] is not None else int(match["index"]))
         position = match.end()
-    if not path or position != len(text) or len(path) > DEEPEST:
+    if not path or position != len(text) or len(path) > DEEPEST or not text.isprintable():
         raise InputError(f"'{text}' is not the path of a field", "a path looks like obstacles[0].velocity")
     return tuple(path)

@@ -12,7 +12,12 @@ from pathlib import Path
 
 import pytest
 
+import cdfctl
+from cdfctl.benchmark.store import folder_name
 from cdfctl.cli.main import main
+from cdfctl.errors import CdfctlError
+from cdfctl.robots.robot_file import DATA
+from cdfctl.types import TrialKey
 
 CDFCTL = f"{sys.executable} -m cdfctl"
 
@@ -73,6 +78,47 @@ def test_a_folder_that_is_gone_and_a_home_that_never_was_are_said(tmp_path: Path
 def test_names_do_not_steer_the_terminal(words: list[str], capfd: pytest.CaptureFixture[str]) -> None:
     assert main(words) == 2
     assert all(c.isprintable() or c == "\n" for c in capfd.readouterr().err)
+
+
+LONG = "x" * 300
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["run", "planar-1", "--out", LONG],
+        ["run", "planar-1", "--out", "loop/x"],
+        ["run", "planar-1", "--out", "\udcff"],
+        ["plot", LONG],
+        ["view", LONG, "--live"],
+        ["build-cdf", f"{LONG}.urdf"],
+        ["check", "planar-1", "--set", f"obstacles[{'9' * 5000}].velocity=[0,0,0]"],
+        ["check", "planar-1", "--set", "\udcff=1"],
+        ["bench", "--scenario", "planar-1", "--trials", "1000000000"],
+    ],
+)
+def test_names_and_numbers_that_are_none_are_said(
+    words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("loop").symlink_to("pool")
+    Path("pool").symlink_to("loop")
+    assert main(words) == 2
+    assert "error: " in capfd.readouterr().err
+
+
+def test_a_robots_name_stays_in_the_folder_of_its_table(tmp_path: Path) -> None:
+    """The table of a robot called ../../x was written above the cache."""
+    path = tmp_path / "arm.yaml"
+    path.write_text((DATA / "planar.yaml").read_text(encoding="utf-8").replace("name: planar", "name: ../../x"))
+    with pytest.raises(CdfctlError, match="robot's name"):
+        cdfctl.load_robot(path)
+
+
+def test_what_a_sweep_sets_makes_no_folders_name_too_long() -> None:
+    names = {folder_name(TrialKey(f"S1[description={'ü' * 300}{i}]", "c", "brake", 0, 0)) for i in range(2)}
+    assert len(names) == 2
+    assert max(len(name.encode()) for name in names) < 200
 
 
 def test_a_bench_that_is_told_to_end_takes_its_workers_along(tmp_path: Path) -> None:

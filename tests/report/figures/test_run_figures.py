@@ -11,8 +11,9 @@ from matplotlib.colors import to_rgb
 from cdfctl.errors import InputError
 from cdfctl.report.figures import style
 from cdfctl.report.figures.joint_space import axis_values, default_instants, joint_space
+from cdfctl.report.figures.output import save_figure
 from cdfctl.report.figures.part import figure_of
-from cdfctl.report.figures.run_view import MOST_INSTANTS, RunView, view_run
+from cdfctl.report.figures.run_view import LONGEST_LABEL, MOST_INSTANTS, RunView, view_run
 from cdfctl.report.figures.task_space import dense, plan_at, plans, task_space
 from cdfctl.report.figures.time_course import panels, time_course
 from cdfctl.robots.robot import load_robot
@@ -234,3 +235,14 @@ def test_many_obstacles_share_one_line(small_run):
     figure = figure_of([time_course(replace(small_run, trajectory=wide, motion=motion))])
     (least,) = [line for line in figure.axes[0].lines if line.get_label() == f"least of {m} obstacles"]
     np.testing.assert_array_equal(least.get_ydata(), arrays.h[:, 0])
+
+
+def test_any_name_of_an_obstacle_is_drawn_as_it_is(tmp_path, small_run):
+    """A formula that is none ended in matplotlib's parser, and a name with a line in front had no place in legends."""
+    motion = SceneMotion(small_run.scenario.obstacles)
+    motion.names = ("_$\\frac{$ \u4e2d" + "x" * 99,)
+    figure = figure_of([time_course(replace(small_run, motion=motion))])
+    (name,) = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert name.startswith("obstacle _$\\frac{$ \u4e2dx")
+    assert len(name) == LONGEST_LABEL
+    save_figure(figure, tmp_path / "time.svg")
