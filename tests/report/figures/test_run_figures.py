@@ -246,3 +246,7 @@ def test_any_name_of_an_obstacle_is_drawn_as_it_is(tmp_path, small_run):
     assert name.startswith("obstacle _$\\frac{$ \u4e2dx")
     assert len(name) == LONGEST_LABEL
     save_figure(figure, tmp_path / "time.svg")
+    ticks = [
+        tick.get_text() for axes in figure.axes for axis in (axes.xaxis, axes.yaxis) for tick in axis.get_ticklabels()
+    ]
+    assert not any("$" in tick for tick in ticks)  # nor is any of our own read as a formula
