@@ -93,7 +93,9 @@ class Runner:
             backend, jobs = joblib.parallel_config(backend="dask", client=self.cluster), -1
         else:
             backend = joblib.parallel_config(backend="loky", inner_max_num_threads=1, idle_worker_timeout=IDLE)
-            jobs = max(1, min(self.jobs, tasks))  # it starts every worker at once, needed or not
+            # It starts every worker at once, needed or not; and one job would be this process, which has to outlive a
+            # trial that kills its worker.
+            jobs = min(self.jobs, max(2, tasks))
         with backend:
             return joblib.Parallel(jobs, return_as=order, batch_size=1, pre_dispatch="2*n_jobs")
 
