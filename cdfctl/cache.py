@@ -9,6 +9,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+from cdfctl.errors import InputError
 from cdfctl.reading import drafted
 
 KEPT = 4  # folders of one kind
@@ -16,10 +17,17 @@ DAY = 86400.0  # s
 
 
 def cache_dir() -> Path:
-    """The user's cache folder for cdfctl, or the one named by ``CDFCTL_CACHE``. It may not exist yet."""
+    """The user's cache folder for cdfctl, or the one named by ``CDFCTL_CACHE``. It may not exist yet.
+
+    Raises:
+        InputError: ``CDFCTL_CACHE`` begins with the home of a user there is not.
+    """
     override = os.environ.get("CDFCTL_CACHE")
     if override:
-        return Path(override).expanduser()
+        try:
+            return Path(override).expanduser()
+        except RuntimeError:
+            raise InputError(f"CDFCTL_CACHE={override}: there is no such home", "give the whole path") from None
     import platformdirs
 
     return Path(platformdirs.user_cache_dir("cdfctl"))

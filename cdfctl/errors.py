@@ -48,6 +48,16 @@ class PlantError(CdfctlError):
     exit_status = 4
 
 
+def printable(text: str, keep: str = "\n") -> str:
+    """``text`` with escapes in the place of control characters, but for those in ``keep``.
+
+    Names of files, and of what is in them, are others' text: it must not steer the terminal, nor turn a line about.
+    """
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c in keep else repr(c)[1:-1] for c in text)
+
+
 def unknown_name(kind: str, name: str, allowed: Iterable[str]) -> InputError:
     """The error for a name that is not in a table, with the nearest valid one and the whole list."""
     names = list(allowed)

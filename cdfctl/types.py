@@ -12,10 +12,11 @@ Conventions, for the whole code:
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from math import isfinite
+from math import hypot, isfinite, isinf
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -32,14 +33,28 @@ Unit = Literal["m", "rad"]
 
 def as_vector(value: ArrayLike, size: int | None, name: str) -> Array:
     """``value`` as a finite float64 vector of the given size (any size if None), or an :class:`InputError`."""
-    try:
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be a list of numbers, found {value!r}") from None
+    array = as_numbers(value, size, name)
+    check_finite(array, name)
+    return array
+
+
+def as_numbers(value: ArrayLike, size: int | None, name: str) -> Array:
+    """The same, finite or not."""
+    array = _array(value, name)
     if array.ndim != 1 or (size is not None and array.shape[0] != size):
         expected = "numbers" if size is None else f"{size} numbers"
         raise InputError(f"{name} must have {expected}, found shape {array.shape}")
-    check_finite(array, name)
+    return array
+
+
+def _array(value: ArrayLike, name: str) -> Array:
+    """``value`` copied into float64, or an :class:`InputError`."""
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{name} must be a list of numbers, found {reprlib.repr(value)}") from None
+    if isinstance(value, np.ma.MaskedArray) and value.mask.any():
+        raise InputError(f"{name} has numbers that are masked")
     return array
 
 
@@ -50,10 +65,20 @@ def check_finite(array: Array, name: str) -> None:
         raise InputError(f"{name} must be finite, found {array.tolist()}")
 
 
-def _positive(value: float, name: str, *, allow_zero: bool = False) -> None:
-    good = np.isfinite(value) and (value > 0.0 or (allow_zero and value == 0.0))
-    if not good:
+def _positive(value: float, name: str, *, allow_zero: bool = False) -> float:
+    """``value`` as a finite float greater than 0 (or 0), or an :class:`InputError`."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{name} must be a number, found {reprlib.repr(value)}") from None
+    if not (isfinite(number) and (number > 0.0 or (allow_zero and number == 0.0))):
         raise InputError(f"{name} must be {'at least' if allow_zero else 'greater than'} 0, found {value}")
+    return number
+
+
+def _make_positive(shape: object, *names: str) -> None:
+    for name in names:
+        object.__setattr__(shape, name, _positive(getattr(shape, name), name))
 
 
 @dataclass(frozen=True)
@@ -63,7 +88,7 @@ class Sphere:
     radius: float
 
     def __post_init__(self) -> None:
-        _positive(self.radius, "radius")
+        _make_positive(self, "radius")
 
 
 @dataclass(frozen=True)
@@ -74,9 +99,7 @@ class Box:
 
     def __post_init__(self) -> None:
         size = as_vector(self.size, 3, "box size")
-        for length in size:
-            _positive(float(length), "box size")
-        object.__setattr__(self, "size", tuple(float(x) for x in size))
+        object.__setattr__(self, "size", tuple(_positive(x, "box size") for x in size.tolist()))
 
 
 @dataclass(frozen=True)
@@ -87,8 +110,7 @@ class Capsule:
     length: float
 
     def __post_init__(self) -> None:
-        _positive(self.radius, "radius")
-        _positive(self.length, "length")
+        _make_positive(self, "radius", "length")
 
 
 @dataclass(frozen=True)
@@ -99,8 +121,7 @@ class Cylinder:
     length: float
 
     def __post_init__(self) -> None:
-        _positive(self.radius, "radius")
-        _positive(self.length, "length")
+        _make_positive(self, "radius", "length")
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,13 +149,12 @@ class PointCloud:
     radius: float = 0.0
 
     def __init__(self, points: ArrayLike, radius: float = 0.0) -> None:
-        _positive(radius, "radius", allow_zero=True)
         object.__setattr__(self, "points", _points(points, "cloud points", least=1))
-        object.__setattr__(self, "radius", float(radius))
+        object.__setattr__(self, "radius", _positive(radius, "radius", allow_zero=True))
 
 
 def _points(value: ArrayLike, name: str, least: int) -> Array:
-    array = np.array(value, dtype=np.float64)
+    array = _array(value, name)
     if array.ndim != 2 or array.shape[1] != 3 or array.shape[0] < least:
         raise InputError(f"{name} must have shape (k, 3) with k >= {least}, found {array.shape}")
     if not np.all(np.isfinite(array)):
@@ -176,9 +196,15 @@ class Obstacle:
         name: str | None = None,
     ) -> None:
         quaternion = as_vector(orientation, 4, "orientation")
-        norm = float(np.linalg.norm(quaternion))
+        norm = hypot(*quaternion)
         if norm < 1e-6:
             raise InputError("orientation must be a quaternion x y z w of non-zero length")
+        if isinf(norm):
+            raise InputError("orientation must be a quaternion x y z w of finite length")
+        if not isinstance(shape, Shape):
+            raise InputError(f"shape must be one of cdfctl's, Sphere, Box and so on, found {reprlib.repr(shape)}")
+        if not isinstance(name, str | None):
+            raise InputError(f"name must be text, found {reprlib.repr(name)}")
         object.__setattr__(self, "shape", shape)
         object.__setattr__(self, "position", as_vector(position, 3, "position"))
         object.__setattr__(self, "orientation", quaternion / norm)
@@ -204,6 +230,8 @@ class Scene:
 
     def __init__(self, obstacles: Iterable[Obstacle] = ()) -> None:
         items = list(obstacles)
+        if not all(isinstance(item, Obstacle) for item in items):
+            raise InputError("a scene is made of cdfctl.Obstacle objects")
         self.shapes = _same(tuple(o.shape for o in items))
         self.names = tuple(o.name if o.name is not None else str(i) for i, o in enumerate(items))
         if len(set(self.names)) != len(self.names):
@@ -216,8 +244,17 @@ class Scene:
 
     @classmethod
     def from_arrays(cls, shapes: tuple[Shape, ...], names: tuple[str, ...], poses: Array, twists: Array) -> Scene:
-        """A scene over given arrays (not copied, not checked): ``poses`` (m, 7) with unit quaternions, ``twists``
-        (m, 6)."""
+        """A scene over given arrays, not copied: ``poses`` (m, 7) with unit quaternions, ``twists`` (m, 6).
+
+        Their numbers are not looked at here.
+
+        Raises:
+            InputError: they are not of these shapes, or not as many as ``shapes`` and ``names``.
+        """
+        m = len(shapes)
+        if not (len(names) == m and np.shape(poses) == (m, 7) and np.shape(twists) == (m, 6)):
+            found = f"{len(names)} names, poses {np.shape(poses)}, twists {np.shape(twists)}"
+            raise InputError(f"{m} shapes need as many names, poses ({m}, 7) and twists ({m}, 6), found {found}")
         scene = cls.__new__(cls)
         scene.shapes, scene.names, scene.poses, scene.twists = shapes, names, poses, twists
         return scene

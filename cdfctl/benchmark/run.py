@@ -22,6 +22,9 @@ from cdfctl.errors import CdfctlError
 
 DIED = "the worker process died twice in this trial"
 
+IDLE = 20
+"""A worker without work ends after so many seconds: it notices in no other way that this process was killed."""
+
 
 @dataclass
 class Runner:
@@ -70,7 +73,7 @@ class Runner:
     def _parallel(self, places: Sequence[int]) -> Any:
         """A generator of (place, answer), in the order in which they come."""
         # One trial a task: what is sent ahead is what a death can take along.
-        return self._workers("generator_unordered")(self._tasks(places))
+        return self._workers("generator_unordered", len(places))(self._tasks(places))
 
     def solve(self, questions: Sequence[tuple[Cell, int]]) -> Generator[Record, None, None]:
         """What is proved of these set-ups (see :mod:`cdfctl.benchmark.solvable`), in order.
@@ -79,16 +82,20 @@ class Runner:
             CdfctlError: a worker died.
         """
         try:
-            with closing(self._workers("generator")(joblib.delayed(solvable_answer)(*q) for q in questions)) as found:
+            workers = self._workers("generator", len(questions))
+            with closing(workers(joblib.delayed(solvable_answer)(*q) for q in questions)) as found:
                 yield from found
         except BrokenExecutor:
             raise CdfctlError("a worker process died", "the same command goes on from there") from None
 
-    def _workers(self, order: str) -> Any:
+    def _workers(self, order: str, tasks: int) -> Any:
         if self.cluster is not None:
             backend, jobs = joblib.parallel_config(backend="dask", client=self.cluster), -1
         else:
-            backend, jobs = joblib.parallel_config(backend="loky", inner_max_num_threads=1), self.jobs
+            backend = joblib.parallel_config(backend="loky", inner_max_num_threads=1, idle_worker_timeout=IDLE)
+            # It starts every worker at once, needed or not; and one job would be this process, which has to outlive a
+            # trial that kills its worker.
+            jobs = min(self.jobs, max(2, tasks))
         with backend:
             return joblib.Parallel(jobs, return_as=order, batch_size=1, pre_dispatch="2*n_jobs")
 

@@ -54,6 +54,8 @@ VERSION = 1
 MANIFEST, TRIALS, ARRIVED, TIMING, LOCK = "manifest.json", "trials.jsonl", "arrived.jsonl", "timing.jsonl", ".lock"
 SOLVABLE = "solvable.jsonl"
 
+LONGEST_NAME = 180  # bytes; file systems take 255, and drafts of it are longer
+
 ANOTHER = "give another --out"
 
 
@@ -127,8 +129,10 @@ class Store:
 
 
 def folder_name(key: TrialKey) -> str:
-    """The name of a kept run: that of ``cdfctl run``, and the rule."""
-    return f"{key.scenario}-{key.controller}-{key.on_infeasible}-{key.seed}-{key.trial}".replace("/", "_")
+    """The name of a kept run: that of ``cdfctl run``, and the rule. What a sweep set can make it too long for one."""
+    name = f"{key.scenario}-{key.controller}-{key.on_infeasible}-{key.seed}-{key.trial}".replace("/", "_")
+    start = name.encode()[:LONGEST_NAME].decode(errors="ignore")
+    return name if start == name else f"{start}-{digest({'name': name})}"
 
 
 def peek(folder: Path, plan: Plan) -> int:

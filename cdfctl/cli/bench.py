@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
@@ -12,6 +13,7 @@ import typer
 
 from cdfctl.cli import options
 from cdfctl.cli.console import note, show, stderr, write, write_json
+from cdfctl.cli.run import interrupts
 from cdfctl.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,6 +23,9 @@ if TYPE_CHECKING:
     from cdfctl.benchmark.store import Store
 
 INTERRUPTED, TOO_FEW = 130, 1
+
+MOST_TRIALS = 1_000_000
+"""Of a cell; the keys of all of them are held in memory."""
 
 
 class Suite(StrEnum):
@@ -76,7 +81,9 @@ def bench(
         list[Rule] | None,
         typer.Option("--on-infeasible", help="May be repeated. [default: each scenario's]", show_default=False),
     ] = None,
-    trials: Annotated[int, typer.Option("--trials", min=1, help="Of each scenario and controller.")] = 100,
+    trials: Annotated[
+        int, typer.Option("--trials", min=1, max=MOST_TRIALS, help="Of each scenario and controller.")
+    ] = 100,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the draws.")] = 0,
     settings: options.Settings = None,
     sweep: Annotated[
@@ -156,10 +163,12 @@ def bench(
 
             client = stack.enter_context(connect(dask))
         store = stack.enter_context(open_store(folder, plan))
+        # A process that is merely killed leaves its workers behind.
+        stop = stack.enter_context(interrupts())
         runner = Runner(plan, jobs or processors(), keep.value, client)
-        finished = _follow(runner, store, quiet=quiet or json)
+        finished = _follow(runner, store, stop, quiet=quiet or json)
         if solvable and finished:
-            finished = _bound(runner, store, quiet=quiet or json)
+            finished = _bound(runner, store, stop, quiet=quiet or json)
         summaries = _summarise(plan, store)
     if json:
         from cdfctl.benchmark.document import document
@@ -200,15 +209,13 @@ def _say(plan: Plan, folder: Path, *, json: bool) -> int:
     return 0
 
 
-def _follow(runner: Runner, store: Store, *, quiet: bool) -> bool:
+def _follow(runner: Runner, store: Store, stop: Callable[[], bool], *, quiet: bool) -> bool:
     """Run what is missing, with a progress bar where standard error is a terminal; False if interrupted on the way."""
     missing = store.missing()
     answers = runner.run(missing)
     try:
         if quiet or not sys.stderr.isatty():
-            for answer in answers:
-                store.add(answer)
-            return True
+            return all(not stop() for _ in map(store.add, answers))
         from rich.progress import Progress
 
         with Progress(console=stderr(), transient=True) as progress:
@@ -216,6 +223,8 @@ def _follow(runner: Runner, store: Store, *, quiet: bool) -> bool:
             for answer in answers:
                 store.add(answer)
                 progress.advance(bar)
+                if stop():
+                    return False
         return True
     except KeyboardInterrupt:
         return False
@@ -223,7 +232,7 @@ def _follow(runner: Runner, store: Store, *, quiet: bool) -> bool:
         answers.close()
 
 
-def _bound(runner: Runner, store: Store, *, quiet: bool) -> bool:
+def _bound(runner: Runner, store: Store, stop: Callable[[], bool], *, quiet: bool) -> bool:
     """Find out what can be solved, of the set-ups not known yet; False if interrupted on the way."""
     from cdfctl.benchmark.solvable.trials import questions
 
@@ -231,13 +240,13 @@ def _bound(runner: Runner, store: Store, *, quiet: bool) -> bool:
     found = runner.solve(waiting)
     try:
         if quiet or not sys.stderr.isatty():
-            for record in found:
-                store.add_solvable(record)
-            return True
+            return all(not stop() for _ in map(store.add_solvable, found))
         from rich.progress import track
 
         for record in track(found, "what can be solved", len(waiting), console=stderr(), transient=True):
             store.add_solvable(record)
+            if stop():
+                return False
         return True
     except KeyboardInterrupt:
         return False

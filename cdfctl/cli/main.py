@@ -15,8 +15,8 @@ import typer
 
 from cdfctl import __version__
 from cdfctl.cli import bench, build_cdf, check, doctor, options, plot, robots, run, scenarios, schema, view
-from cdfctl.cli.console import abandon_stdout
-from cdfctl.cli.failures import report_bug, report_failure, report_usage
+from cdfctl.cli.console import abandon, note, open_streams
+from cdfctl.cli.failures import failure_of_system, report_bug, report_failure, report_usage
 from cdfctl.errors import CdfctlError
 
 # What Typer raises for a bad command line. It does not export this class, only the class two below it.
@@ -67,6 +67,7 @@ def _root(
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status; nothing but the interpreter's own end escapes from here."""
     words = list(sys.argv[1:] if arguments is None else arguments)
+    open_streams()
     if arguments is None:
         # Taking all modules apart at the end takes a sixth of a short command, and the system frees the memory anyhow.
         atexit.register(gc.freeze)
@@ -83,10 +84,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (KeyboardInterrupt, typer.Abort) as error:
         if isinstance(error.__cause__, EOFError):  # Typer takes it for the end of what someone types
             return report_bug(error.__cause__, words, debug=debug)
-        print("cdfctl: interrupted", file=sys.stderr)
+        note("cdfctl: interrupted")
         return INTERRUPTED
     except BrokenPipeError:
-        abandon_stdout()  # the reader has gone (`cdfctl schema | head`): say nothing
+        abandon(sys.stdout)  # the reader has gone (`cdfctl schema | head`): say nothing
         return CdfctlError.exit_status
     except Exception as error:  # the one place: whatever else escapes is a bug, and a bug is one line and a log
-        return report_bug(error, words, debug=debug)
+        failure = failure_of_system(error)
+        return report_bug(error, words, debug=debug) if failure is None else report_failure(failure, debug=debug)

@@ -61,11 +61,12 @@ def config_of(variant: str, given: dict[str, Any]) -> ControllerConfig:
         InputError: an unknown variant or parameter (with the nearest valid name), or a value that is not allowed; all
             values at once.
     """
-    if variant not in VARIANTS:
-        raise unknown_name("controller", variant, VARIANTS)
+    if not isinstance(variant, str) or variant not in VARIANTS:
+        raise unknown_name("controller", str(variant), VARIANTS)
     names = [name for name in ControllerConfig.model_fields if name != "variant"]
     for name in given:
         if name not in names:
             raise unknown_name("controller parameter", name, names)
-    plain = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in given.items()}
+    numeric = (np.ndarray, np.generic)
+    plain = {name: value.tolist() if isinstance(value, numeric) else value for name, value in given.items()}
     return checked(ControllerConfig, {"variant": variant, **plain}, "controller")

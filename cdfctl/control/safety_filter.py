@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 from collections import Counter
+from math import hypot
+from threading import get_ident
 from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdfctl.control.core import core_of
+from cdfctl.control.core import check_scene, core_of
 from cdfctl.control.parameters import Parameters, config_of, resolved
 from cdfctl.errors import InputError, unknown_name
+from cdfctl.fields.kernel.jit import njit
 from cdfctl.robots.robot import Robot
 from cdfctl.scenario.variants import DEFAULT_VARIANT
-from cdfctl.types import Array, Decision, Scene, as_vector, check_finite
+from cdfctl.types import Array, Decision, Scene, as_numbers, as_vector, check_finite
 
 OnBadInput = Literal["error", "brake"]
 
 MOST_OVER = 1e3
 """A nominal velocity is taken as at most this many times the velocity limit: farther out no answer changes, but the
 solver's numbers would."""
+
+SHORTEST, LONGEST = 0.5, 2.0
+"""Lengths of what passes for a unit quaternion; of a zero one no rotation can be made, and no row would hold."""
 
 
 class SafetyFilter:
@@ -32,8 +38,8 @@ class SafetyFilter:
     robot has any (:func:`cdfctl.load_robot`); with ``self_collision=K``, the K nearest pairs of the robot's own links.
     A nominal velocity over the limits is no error: the answer is the nearest one within them.
 
-    It keeps warm starts and the last command from step to step: one instance a loop and a thread, :meth:`reset` between
-    runs. From a reset on, the same calls give the same answers.
+    It keeps warm starts and the last command from step to step: one instance a loop, :meth:`reset` between runs. From a
+    reset on, the same calls give the same answers. A step while another thread is in one is refused.
 
     Attributes:
         counts: how many steps ended in each ``status``, and how many of them in a brake for ``bad-input``.
@@ -63,11 +69,15 @@ class SafetyFilter:
         Raises:
             InputError: an unknown variant or parameter, or a value that is not allowed.
         """
+        if not isinstance(robot, Robot):
+            raise InputError(f"robot must be a cdfctl.Robot, found {type(robot).__name__}", "see cdfctl.load_robot")
         if on_bad_input not in get_args(OnBadInput):
             raise unknown_name("on_bad_input", str(on_bad_input), get_args(OnBadInput))
-        self._core = core_of(robot, *resolved(config_of(variant, parameters)), dt)
+        period = as_vector([dt], 1, "dt").item()
+        self._core = core_of(robot, *resolved(config_of(variant, parameters)), period)
         self._brakes = on_bad_input == "brake"
         self._most = MOST_OVER * robot.velocity_limit
+        self._in_step: int | None = None  # the thread that is
         self.counts: Counter[str] = Counter()
 
     @property
@@ -99,24 +109,37 @@ class SafetyFilter:
             what was done (``status``).
 
         Raises:
-            InputError: a wrong length or type; a number that is not finite, unless ``on_bad_input`` is ``brake``.
+            InputError: a wrong length or type; another thread is in a step; a number that is not finite, or an
+                orientation that is none, unless ``on_bad_input`` is ``brake``.
         """
         if not isinstance(scene, Scene):
             raise InputError(f"scene must be a cdfctl.Scene, found {type(scene).__name__}")
+        thread = get_ident()
+        if self._in_step is not None and self._in_step != thread:
+            raise InputError("another thread is in a step of this filter", "one filter a loop")
+        self._in_step = thread
+        try:
+            return self._step(q, scene, u_nominal, u_last)
+        finally:
+            self._in_step = None
+
+    def _step(self, q: ArrayLike, scene: Scene, u_nominal: ArrayLike, u_last: ArrayLike | None) -> Decision:
         n = self.robot.n
         given = {"q": q, "u_nominal": u_nominal} | ({} if u_last is None else {"u_last": u_last})
-        vectors = {name: _vector(value, n, name) for name, value in given.items()}
+        vectors = {name: as_numbers(value, n, name) for name, value in given.items()}
         try:
+            _check_orientations(scene)
             for name, vector in vectors.items():
                 check_finite(vector, name)
             if u_last is not None:
                 self._core.u_last = vectors["u_last"]
             nominal = np.minimum(np.maximum(vectors["u_nominal"], -self._most), self._most)
             decision = self._core.step(vectors["q"], scene, nominal)
-        except InputError as error:
+        except (InputError, ArithmeticError) as error:
+            wrong = error if isinstance(error, InputError) else InputError(f"the numbers are too large: {error}")
             if not self._brakes:
-                raise
-            decision = self._brake(len(scene), error.message)
+                raise wrong from None
+            decision = self._brake(len(scene), wrong.message)
         self.counts[decision.status] += 1
         return decision
 
@@ -142,12 +165,21 @@ class SafetyFilter:
         )
 
 
-def _vector(value: ArrayLike, n: int, name: str) -> Array:
-    """``value`` as a vector of n numbers, finite or not."""
-    try:
-        vector = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be a list of numbers, found {value!r}") from None
-    if vector.shape != (n,):
-        raise InputError(f"{name} must have {n} numbers, found shape {vector.shape}")
-    return vector
+def _check_orientations(scene: Scene) -> None:
+    """Raise :class:`InputError` naming the first obstacle whose orientation is none."""
+    poses = np.array(scene.poses, dtype=np.float64, order="C")
+    o = _first_wrong(poses)
+    if o >= 0:
+        check_scene(scene)
+        found = f"its length is {hypot(*poses[o, 3:].tolist()):g}"
+        raise InputError(f"the orientation of obstacle '{scene.names[o]}' is no unit quaternion: {found}")
+
+
+@njit
+def _first_wrong(poses: Array) -> int:
+    """The first of ``poses`` (m, 7) without a unit quaternion, -1 where there is none."""
+    for o in range(poses.shape[0]):
+        length = np.sqrt(poses[o, 3] ** 2 + poses[o, 4] ** 2 + poses[o, 5] ** 2 + poses[o, 6] ** 2)
+        if not SHORTEST < length < LONGEST:
+            return o
+    return -1

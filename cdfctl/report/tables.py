@@ -8,6 +8,8 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from cdfctl.errors import printable
+
 
 def listing(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
     """A table with a heading; only its last column may wrap."""
@@ -25,7 +27,7 @@ def facts(rows: Iterable[tuple[str, str | Text]]) -> Table:
     table.add_column(no_wrap=True, style="bold")
     table.add_column(overflow="fold")
     for name, value in rows:
-        table.add_row(name, value if isinstance(value, Text) else Text(value))
+        table.add_row(name, value if isinstance(value, Text) else Text(printable(value)))
     return table
 
 

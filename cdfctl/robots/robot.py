@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cdfctl.errors import InputError, unknown_name
+from cdfctl.errors import InputError, name_hint, unknown_name
 from cdfctl.robots.braking import Braking
 from cdfctl.robots.convex import ConvexPiece
 from cdfctl.robots.robot_file import (
@@ -24,6 +24,7 @@ from cdfctl.robots.robot_file import (
     RobotFile,
     ShippedRobot,
     find_urdf,
+    name_from,
     read_robot_file,
     shipped_names,
     shipped_robots,
@@ -176,8 +177,12 @@ def load_robot(
     """
     from cdfctl.robots.assembly import assemble_robot
 
+    if not isinstance(name_or_path, str | Path):
+        raise InputError(f"a robot is a name or a path, found {type(name_or_path).__name__}")
     path = Path(name_or_path)
     text = str(name_or_path)
+    if not text.isprintable():
+        raise InputError(f"{text!r} is not the name of a robot", name_hint("", shipped_names()))
     suffix = path.suffix.lower()
     own_dirs = tuple(Path(entry) for entry in package_dirs)
     if suffix == ".urdf":
@@ -195,7 +200,7 @@ def load_robot(
         urdf, file_dirs, file_srdf = find_urdf(file, file_path)
         own_dirs += file_dirs
     if file is None:
-        file = RobotFile(version=1, name=path.stem, description="", source=str(path), licence="", urdf=path.name)
+        file = RobotFile(version=1, name=name_from(path), description="", source=str(path), licence="", urdf=path.name)
     speed, speeds = _one_or_named(velocity_limits)
     acceleration, accelerations = _one_or_named(acceleration_limits)
     changes = {

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import importlib.metadata
 import json
+import re
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 from pydantic_core import ErrorDetails
 
 from cdfctl.errors import InputError, MissingError, name_hint
 from cdfctl.reading import check_regular
 from cdfctl.scenario.problems import Problem, ScenarioErrors, path_text
+from cdfctl.scenario.values import refuse
 from cdfctl.scenario.yaml_loader import MAX_BYTES, Document, YamlError, read
 
 DATA = Path(__file__).parent / "data"
@@ -21,6 +23,22 @@ ROBOT_FILE_SUFFIXES = (".yaml", ".yml")
 
 class _Strict(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+LONGEST_NAME = 64
+_NO_PART_OF_A_NAME = re.compile(r"[^\w .+-]")
+
+
+def _name(text: str) -> str:
+    """It becomes part of the names of files (tables, for one), which have to stay in their folder."""
+    if not text or len(text) > LONGEST_NAME or _NO_PART_OF_A_NAME.search(text):
+        raise refuse(f"a robot's name is 1 to {LONGEST_NAME} letters, digits, spaces and '.', '_', '+', '-'")
+    return text
+
+
+def name_from(path: Path) -> str:
+    """The name of a robot that has none but its file's."""
+    return _NO_PART_OF_A_NAME.sub("_", path.stem)[:LONGEST_NAME]
 
 
 class DataPackage(_Strict):
@@ -56,7 +74,7 @@ class RobotFile(_Strict):
     """
 
     version: Literal[1]
-    name: str = Field(min_length=1)
+    name: Annotated[str, AfterValidator(_name)]
     description: str
     source: str
     licence: str

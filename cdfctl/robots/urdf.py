@@ -94,6 +94,8 @@ def _names(path: Path, root: Element, tag: str) -> tuple[str, ...]:
     for name in names:
         if not name:
             raise InputError(f"{path}: a {tag} has no name")
+        if not name.isprintable():
+            raise InputError(f"{path}: the name of a {tag} holds control characters: {name!r}")
         if names.count(name) > 1:
             raise InputError(f"{path}: the {tag} name '{name}' is used twice")
     if not names:

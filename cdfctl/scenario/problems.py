@@ -14,7 +14,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from cdfctl.errors import InputError
+from cdfctl.errors import InputError, printable
 
 Path = tuple[str | int, ...]
 
@@ -27,7 +27,7 @@ DEEPEST = 16
 WIDTH = 100
 """Characters of a line that an excerpt shows."""
 
-_STEP = re.compile(r"\.?(?P<key>[^.\[\]=\s]+)|\[(?P<index>\d+)\]")
+_STEP = re.compile(r"\.?(?P<key>[^.\[\]=\s]+)|\[(?P<index>[0-9]{1,9})\]")
 
 
 @dataclass(frozen=True)
@@ -56,10 +56,10 @@ class Problem:
 
     def __str__(self) -> str:
         place = self.origin or self.file
-        message, field, hint = (_clean(text or "") for text in (self.message, self.field, self.hint))
+        message, field, hint = (printable(text or "", "") for text in (self.message, self.field, self.hint))
         if self.origin is None and self.line is not None:
             place = f"{self.file}:{self.line}:{self.column}"
-        lines = [f"{_clean(place)}: error: {message}"]
+        lines = [f"{printable(place, '')}: error: {message}"]
         if field:
             lines.append(f"  field  {field}")
         if hint:
@@ -101,11 +101,6 @@ class ScenarioErrors(InputError):  # noqa: N818  the plural says that it carries
         return type(self), (self.problems, self.file)
 
 
-def _clean(text: str) -> str:
-    """Without control characters: what a file holds must not steer the terminal."""
-    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
-
-
 def path_text(path: Path) -> str:
     """``("obstacles", 0, "velocity")`` as ``obstacles[0].velocity``."""
     text = ""
@@ -129,6 +124,6 @@ def parse_path(text: str) -> Path:
             break
         path.append(match["key"] if match["key"] is not None else int(match["index"]))
         position = match.end()
-    if not path or position != len(text) or len(path) > DEEPEST:
+    if not path or position != len(text) or len(path) > DEEPEST or not text.isprintable():
         raise InputError(f"'{text}' is not the path of a field", "a path looks like obstacles[0].velocity")
     return tuple(path)

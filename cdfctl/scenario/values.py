@@ -28,6 +28,9 @@ def about(description: str, unit: str = "", source: str = "ours") -> Any:
     return Field(description=description, json_schema_extra={"x-unit": unit, "x-source": source})
 
 
+MOST = 1e12
+"""The greatest number, whatever its unit: products of a few of them are still numbers."""
+
 Place = tuple[str | int, ...]
 Complaint = tuple[str, str | None, Place]
 """A message, a hint or None, and the place below the validated value."""
@@ -127,6 +130,8 @@ class Real:
             number = math.inf
         if not math.isfinite(number):
             raise refuse(f"expected a finite number, found {found(number)}")
+        if abs(number) > MOST:
+            raise refuse(f"must be within ±{MOST:g}, found {found(value)}")
         if self.above is not None and not number > self.above:
             raise refuse(f"must be greater than {self.above:g}, found {found(value)}")
         if self.least is not None and not number >= self.least:
@@ -149,8 +154,6 @@ class Real:
         low, high = (self._number(end) for end in ends)
         if low > high:
             raise refuse(f"uniform needs a <= b, found [{low!r}, {high!r}]")
-        if not math.isfinite(high - low):
-            raise refuse("uniform spans too wide a range")
         if "mirrored" not in value:
             return Uniform(uniform=(low, high))
         if low < 0.0:

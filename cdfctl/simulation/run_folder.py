@@ -63,16 +63,24 @@ def check_target(folder: Path) -> None:
     """Refuse, before anything is run, a folder that could not be written afterwards.
 
     Raises:
-        InputError: it is a file, or a non-empty folder that is not a run folder, or there is no right to write there.
+        InputError: it is a file, or a non-empty folder that is not a run folder, or there is no right to write there,
+            or its name is none.
     """
+    try:
+        str(folder).encode()
+        _check_target(folder)
+    except UnicodeEncodeError:
+        raise InputError(f"{folder}: the name is not UTF-8", hint="give another --out") from None
+    except (OSError, RuntimeError) as error:  # a name too long, a link to itself
+        why = error.strerror if isinstance(error, OSError) else error
+        raise InputError(f"{folder}: cannot be written: {why}", hint="give another --out") from None
+
+
+def _check_target(folder: Path) -> None:
     if folder.exists() or folder.is_symlink():
         if not folder.is_dir():
             raise InputError(f"{folder}: is a file, not a run folder", hint="give another --out")
-        try:
-            foreign = any(folder.iterdir()) and not _is_ours(folder)
-        except OSError as error:
-            raise InputError(f"{folder}: cannot be read: {error.strerror or error}") from None
-        if foreign:
+        if any(folder.iterdir()) and not _is_ours(folder):
             raise InputError(f"{folder}: is not empty and not a run folder of cdfctl", hint="give another --out")
     parent = folder.resolve().parent
     while not parent.exists():

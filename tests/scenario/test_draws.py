@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from cdfctl.errors import InputError
 from cdfctl.scenario import Scenario, Uniform, draw, dump, floats, has_draws, load_scenario, number, resolve
+from cdfctl.scenario.values import MOST
 from cdfctl.scenario.wording import validate
 from cdfctl.scenario.yaml_loader import read
 
@@ -84,14 +85,14 @@ def test_what_still_holds_draws_says_so():
         draw(scenario, 0, -1)
 
 
-reals = st.floats(allow_nan=False, allow_infinity=False)
+reals = st.floats(-MOST, MOST)
 ends = st.floats(-1e6, 1e6)
 numbers = (
     reals
     | st.tuples(ends, ends).map(lambda ab: {"uniform": sorted(ab)})
     | st.tuples(ends, ends).map(lambda ab: {"uniform": sorted(map(abs, ab)), "mirrored": True})
 )
-positives = st.floats(min_value=0, exclude_min=True, allow_infinity=False)
+positives = st.floats(0, MOST, exclude_min=True)
 three = st.lists(numbers, min_size=3, max_size=3)
 texts = st.text(st.characters(exclude_categories=["C", "Z"]) | st.just(" "), max_size=30) | st.sampled_from(
     [

@@ -96,7 +96,7 @@ CASES = [
         "expected a number, found a map",
         "draw is",
     ),
-    (("2.4, -2.4", "{uniform: [-1e308, 1e308]}, 0"), 12, 16, "obstacles[0].position[0]", "too wide a range", None),
+    (("2.4, -2.4", "{uniform: [-1e308, 1e308]}, 0"), 12, 16, "obstacles[0].position[0]", "must be within ±1e+12", None),
     (
         ("radius: 0.3", "radius: {uniform: [-1, 1]}"),
         11,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -46,7 +47,9 @@ def save_figure(figure: Figure, path: Path, dpi: int = DPI) -> None:
     suffix = path.suffix.lower()
     draft = path.with_name(f".{path.name}.new")
     try:
-        with drafted(path, draft), styled():
+        with drafted(path, draft), styled(), warnings.catch_warnings():
+            # A letter that the font lacks, in somebody's name, is drawn as a box.
+            warnings.filterwarnings("ignore", message="Glyph .* missing from")
             engine = figure.get_layout_engine()
             if engine is not None:  # once: saving would lay everything out twice
                 engine.execute(figure)

@@ -25,6 +25,9 @@ from cdfctl.types import Array, Scene, Trajectory
 MOST_INSTANTS = 400
 """At so many instants, evenly spread, the clearance is measured: of a short run between its control steps too."""
 
+LONGEST_LABEL = 40
+"""Characters of an obstacle's name in a figure."""
+
 
 @dataclass
 class RunView:
@@ -92,7 +95,11 @@ class RunView:
     def obstacle(self, i: int) -> str:
         """What obstacle ``i`` is called in a figure."""
         name = self.motion.names[i]
-        return f"obstacle {int(name) + 1}" if name.isdecimal() else name
+        if name.isdecimal():
+            return f"obstacle {int(name) + 1}"
+        if name.startswith("_"):  # such a line has no place in matplotlib's legends
+            name = f"obstacle {name}"
+        return name if len(name) <= LONGEST_LABEL else name[: LONGEST_LABEL - 1] + "…"
 
     @cached_property
     def clearance(self) -> tuple[Array, Array]:

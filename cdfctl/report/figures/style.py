@@ -49,6 +49,7 @@ STYLE: dict[str, Any] = {
     "ytick.major.width": 0.6,
     "lines.linewidth": 1.1,
     "hatch.linewidth": 0.5,
+    "text.parse_math": False,  # a "$" in somebody's name is no formula
     "svg.hashsalt": "cdfctl",  # else the identifiers in an SVG are random
     "svg.fonttype": "path",
     "pdf.fonttype": 42,

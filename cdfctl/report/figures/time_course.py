@@ -202,12 +202,17 @@ def room(axes: Axes, view: RunView) -> None:
 
 def step_time(axes: Axes, view: RunView) -> None:
     """Wall-clock time of the controller's step, and the control period."""
+    from matplotlib.ticker import LogFormatter
+
     taken = 1e3 * view.trajectory.step_time
     axes.plot(view.t[:-1], taken, linestyle="none", marker=".", markersize=2.5, color=BLUE)
     period = 1e3 * view.scenario.simulation.dt
     axes.axhline(period, color=GREY, linewidth=0.9, linestyle="--", label=f"control period, {period:g} ms")
     if len(taken) and (taken > 0.0).all():
         axes.set_yscale("log")
+        # Powers of ten are formulas to matplotlib, which the style does not read.
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_minor_formatter(LogFormatter())
         axes.set_ylim(taken.min() / 1.6, 1.6 * max(period, taken.max()))
     legend_above(axes, 2)
 

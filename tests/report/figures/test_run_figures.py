@@ -11,8 +11,9 @@ from matplotlib.colors import to_rgb
 from cdfctl.errors import InputError
 from cdfctl.report.figures import style
 from cdfctl.report.figures.joint_space import axis_values, default_instants, joint_space
+from cdfctl.report.figures.output import save_figure
 from cdfctl.report.figures.part import figure_of
-from cdfctl.report.figures.run_view import MOST_INSTANTS, RunView, view_run
+from cdfctl.report.figures.run_view import LONGEST_LABEL, MOST_INSTANTS, RunView, view_run
 from cdfctl.report.figures.task_space import dense, plan_at, plans, task_space
 from cdfctl.report.figures.time_course import panels, time_course
 from cdfctl.robots.robot import load_robot
@@ -264,3 +265,18 @@ def test_the_second_unit_of_a_velocity_is_a_velocity(arm_run):
     slides[3] = True
     view = replace(arm_run, robot=replace(arm_run.robot, prismatic=slides))
     assert "velocity u [rad/s or m/s]" in [panel.label for panel in panels(view)]
+
+
+def test_any_name_of_an_obstacle_is_drawn_as_it_is(tmp_path, small_run):
+    """A formula that is none ended in matplotlib's parser, and a name with a line in front had no place in legends."""
+    motion = SceneMotion(small_run.scenario.obstacles)
+    motion.names = ("_$\\frac{$ \u4e2d" + "x" * 99,)
+    figure = figure_of([time_course(replace(small_run, motion=motion))])
+    (name,) = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert name.startswith("obstacle _$\\frac{$ \u4e2dx")
+    assert len(name) == LONGEST_LABEL
+    save_figure(figure, tmp_path / "time.svg")
+    ticks = [
+        tick.get_text() for axes in figure.axes for axis in (axes.xaxis, axes.yaxis) for tick in axis.get_ticklabels()
+    ]
+    assert not any("$" in tick for tick in ticks)  # nor is any of our own read as a formula
