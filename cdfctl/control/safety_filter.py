@@ -13,19 +13,16 @@ from numpy.typing import ArrayLike
 from cdfctl.control.core import check_scene, core_of
 from cdfctl.control.parameters import Parameters, config_of, resolved
 from cdfctl.errors import InputError, unknown_name
-from cdfctl.fields.kernel.jit import njit
+from cdfctl.fields.kernel.parts import first_not_turned
 from cdfctl.robots.robot import Robot
 from cdfctl.scenario.variants import DEFAULT_VARIANT
-from cdfctl.types import Array, Decision, Scene, as_numbers, as_vector, check_finite
+from cdfctl.types import Decision, Scene, as_numbers, as_vector, check_finite
 
 OnBadInput = Literal["error", "brake"]
 
 MOST_OVER = 1e3
 """A nominal velocity is taken as at most this many times the velocity limit: farther out no answer changes, but the
 solver's numbers would."""
-
-SHORTEST, LONGEST = 0.5, 2.0
-"""Lengths of what passes for a unit quaternion; of a zero one no rotation can be made, and no row would hold."""
 
 
 class SafetyFilter:
@@ -168,18 +165,8 @@ class SafetyFilter:
 def _check_orientations(scene: Scene) -> None:
     """Raise :class:`InputError` naming the first obstacle whose orientation is none."""
     poses = np.array(scene.poses, dtype=np.float64, order="C")
-    o = _first_wrong(poses)
+    o = first_not_turned(poses)
     if o >= 0:
         check_scene(scene)
         found = f"its length is {hypot(*poses[o, 3:].tolist()):g}"
         raise InputError(f"the orientation of obstacle '{scene.names[o]}' is no unit quaternion: {found}")
-
-
-@njit
-def _first_wrong(poses: Array) -> int:
-    """The first of ``poses`` (m, 7) without a unit quaternion, -1 where there is none."""
-    for o in range(poses.shape[0]):
-        length = np.sqrt(poses[o, 3] ** 2 + poses[o, 4] ** 2 + poses[o, 5] ** 2 + poses[o, 6] ** 2)
-        if not SHORTEST < length < LONGEST:
-            return o
-    return -1

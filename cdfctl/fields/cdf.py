@@ -18,6 +18,7 @@ from __future__ import annotations
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from cdfctl.errors import InputError
@@ -29,7 +30,7 @@ from cdfctl.fields.kernel.rows import Answer, new_answer
 from cdfctl.fields.kernel.starts import Table, empty_table
 from cdfctl.fields.sdf import SDF
 from cdfctl.robots.robot import Robot
-from cdfctl.types import Array, FieldQuery, Scene, Unit, as_vector
+from cdfctl.types import Array, FieldQuery, Scene, Shape, Unit, as_vector
 
 SPARE_MEMORY = 2  # contacts remembered beyond the sheets of the last query
 MOST_SHEETS = 16
@@ -53,6 +54,7 @@ class CDF:
         self._room, self._rows = (0, 1), new_contact_rows(0, 1, robot.n)
         self._no_distances = new_answer(0, robot.n)
         self._names: tuple[str, ...] = ()
+        self._shapes: tuple[Shape | None, ...] = ()
         self._memory = new_memory(0, MOST_SHEETS + SPARE_MEMORY, robot.n, len(self._body.joint))
 
     @cached_property
@@ -109,7 +111,7 @@ class CDF:
         parts, room = self._parts.of(scene), (len(scene), sheets)
         if self._room != room:
             self._rows, self._room = new_contact_rows(*room, self.robot.n), room
-        rows, memory = self._rows, self._remember(scene.names)
+        rows, memory = self._rows, self._remember(scene)
         inside = contact_rows(
             self._body, q, parts, memory, self._table, sheets, every_obstacle, rows, distances, self._work
         )
@@ -126,8 +128,10 @@ class CDF:
         )
         return answer, inside
 
-    def _remember(self, names: tuple[str, ...]) -> Memory:
-        """The memory in the order of ``names``: that of obstacles no longer there is dropped."""
+    def _remember(self, scene: Scene) -> Memory:
+        """The memory in the order of ``scene``: that of obstacles no longer there is dropped, and one of another shape
+        is taken for one that leapt."""
+        names, shapes = scene.names, scene.shapes
         if names is not self._names and names != self._names:
             old, places = self._memory, {name: i for i, name in enumerate(self._names)}
             self._memory = new_memory(len(names), old.piece.shape[1], self.robot.n, old.tried.shape[1])
@@ -136,7 +140,12 @@ class CDF:
                     for member in ("known", "piece", "x", "motion", "steady", "tried", "drift", "pose"):
                         getattr(self._memory, member)[i] = getattr(old, member)[places[name]]
             self._memory.turn[:], self._memory.q[:] = old.turn, old.q
-        self._names = names
+            self._shapes = tuple(self._shapes[places[name]] if name in places else None for name in names)
+        if shapes is not self._shapes:
+            for i, (shape, before) in enumerate(zip(shapes, self._shapes, strict=True)):
+                if shape is not before:
+                    self._memory.pose[i] = np.inf  # far from here
+        self._names, self._shapes = names, shapes
         return self._memory
 
 

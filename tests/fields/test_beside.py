@@ -7,6 +7,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from cdfctl.errors import InputError
 from cdfctl.fields.cdf import CDF
 from cdfctl.fields.sdf import SDF
 from cdfctl.robots.robot import load_robot
@@ -57,3 +58,26 @@ def test_each_answers_as_alone(robot_name: str, every_link: bool, sheets: int) -
         assert_same(contacts, alone.query(q, scene) if sheets == 1 else alone.contacts(q, scene, sheets=sheets))
         assert_same(distances, own.per_link(q, scene) if every_link else own.query(q, scene), atol=1e-12)
     assert 10 < inside < 25
+
+
+def test_another_shape_under_the_same_name_is_searched_widely_at_once() -> None:
+    """A long box in the place of a small ball out of reach: a field that has seen the ball finds it in that query."""
+    robot = load_robot("franka")
+    for draw in range(5):
+        random = np.random.default_rng(draw)
+        warm, q = CDF(robot), robot.home + random.normal(size=robot.n) * 0.3
+        position = [random.uniform(1.0, 3.0), random.uniform(-0.3, 0.3), 0.5]
+        for _ in range(10):
+            warm.query(q, Scene([Obstacle(Sphere(0.01), position, name="o")]))
+        changed = Scene([Obstacle(Box((5.0, 0.2, 0.2)), position, name="o")])
+        expected = CDF(robot).query(q, changed).d[0]
+        assert warm.query(q, changed).d[0] == pytest.approx(expected, abs=0.05)
+
+
+def test_an_orientation_that_is_none_is_refused() -> None:
+    robot = load_robot("planar")
+    poses = np.array([[0.5, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0]])
+    scene = Scene.from_arrays((Sphere(0.1),), ("ball",), poses, np.zeros((1, 6)))
+    for field in (CDF(robot), SDF(robot)):
+        with pytest.raises(InputError, match="orientation of obstacle 'ball'"):
+            field.query(robot.home, scene)

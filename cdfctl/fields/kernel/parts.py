@@ -16,6 +16,7 @@ from cdfctl.robots.convex import ConvexSet, convex_sets
 from cdfctl.types import Array, IntArray, Scene, Shape
 
 BLOCK_SIZE = 16  # most parts in a block
+SHORTEST, LONGEST = 0.5, 2.0  # lengths of what passes for a unit quaternion; of zero no rotation can be made
 
 _BLOCK = np.dtype(
     [
@@ -66,7 +67,7 @@ class SceneParts:
         """The arrays of ``scene``; they are overwritten by the next call.
 
         Raises:
-            InputError: a number of the scene is not finite.
+            InputError: a number of the scene is not finite, or an orientation is none.
         """
         if self._parts is None or not _same(scene.shapes, self._shapes):
             self._parts = parts_of(scene.shapes)
@@ -76,6 +77,9 @@ class SceneParts:
         turn_obstacles(parts.pose, parts.rotation)
         if not (all_finite(parts.pose) and all_finite(parts.twist)):
             raise InputError("the poses and twists of the obstacles must be finite")
+        wrong = first_not_turned(parts.pose)
+        if wrong >= 0:
+            raise InputError(f"the orientation of obstacle '{scene.names[wrong]}' is no unit quaternion")
         return parts
 
 
@@ -141,6 +145,16 @@ def turn_obstacles(pose: Array, rotation: Array) -> None:
             (s * (x * z - y * w), s * (y * z + x * w), 1.0 - s * (x * x + y * y)),
         )
         store_rot(rotation, o, r)
+
+
+@njit
+def first_not_turned(pose: Array) -> int:
+    """The first of ``pose`` (m, 7) whose quaternion is nowhere near a unit one, -1 where there is none."""
+    for o in range(pose.shape[0]):
+        length2 = pose[o, 3] ** 2 + pose[o, 4] ** 2 + pose[o, 5] ** 2 + pose[o, 6] ** 2
+        if not SHORTEST * SHORTEST < length2 < LONGEST * LONGEST:
+            return o
+    return -1
 
 
 @njit
