@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -65,6 +65,7 @@ class Core:
             on_infeasible=parameters.on_infeasible,
             solver=parameters.solver,
         )
+        _rehearse(n, p.solver)
         own = SelfDistance(robot, p.self_collision, p.self_collision_margin) if p.self_collision else None
         self._own = own if own is not None and own.most else None
         self._accelerates_freely = bool(np.isinf(robot.acceleration_limit).all())
@@ -218,6 +219,11 @@ def core_of(
 
         return PredictiveCore(robot, variant, parameters, dt, known)
     return Core(robot, variant, parameters, dt)
+
+
+@cache
+def _rehearse(n: int, solver: str) -> None:
+    StepQP(n, solver=solver).rehearse()
 
 
 def _at_once(fields: Sequence[Field]) -> Callable[..., tuple[FieldQuery, FieldQuery]] | None:

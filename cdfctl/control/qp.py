@@ -75,6 +75,16 @@ class StepQP:
         self._p, self._rho = slack_weight, violation_weight
         self._on_infeasible, self._solver, self._n = on_infeasible, solver, n
 
+    def rehearse(self) -> None:
+        """Solve small programs of every kind, so that all that a step may need is loaded and compiled: the moment an
+        obstacle comes near is none to wait for that."""
+        zero, one = np.zeros(self._n), np.ones(self._n)
+        G, soft = np.stack([one, -one]), np.ones(2, dtype=np.bool_)
+        for least in (0.5, -0.5, 2.0 * self._n):  # rows that can be satisfied, that contradict each other, that cannot
+            rhs = np.array([-abs(least), 1.0 if least > 0.0 else least])
+            for delta in (np.zeros(2), one[:1].repeat(2)):
+                self.solve(zero, zero, Rows(G, rhs, soft, delta), -one, one)
+
     def solve(self, u_ref: Array, u_last: Array, rows: Rows, low: Array, high: Array) -> Command:
         """The velocity for this step; ``low``, ``high`` (n,) are the box, which must not be empty.
 
