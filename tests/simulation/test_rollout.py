@@ -17,7 +17,7 @@ from cdfctl.simulation.goals import passed
 from cdfctl.simulation.plants.kinematic import KinematicPlant
 from cdfctl.simulation.recorder import FIRST_CAPACITY, Recorder
 from cdfctl.simulation.run_folder import arrays_of
-from cdfctl.types import Array, Decision, Scene, State, Trajectory
+from cdfctl.types import Array, Decision, Obstacle, Scene, Sphere, State, Trajectory
 
 ONE_JOINT = """\
 version: 1
@@ -134,9 +134,7 @@ def test_hold_without_until_is_judged_at_the_limit(make: Make) -> None:
 
 
 def test_passed() -> None:
-    scene = Scene.from_arrays(
-        (), (), np.array([[0.0, -0.4, 0, 0, 0, 0, 1], [0, -0.31, 0, 0, 0, 0, 1]]), np.zeros((2, 6))
-    )
+    scene = Scene([Obstacle(Sphere(0.1), [0.0, -0.4, 0.0]), Obstacle(Sphere(0.1), [0.0, -0.31, 0.0])])
     assert passed(scene, BeyondConfig(axis="y", side="below", value=-0.3))
     assert not passed(scene, BeyondConfig(axis="y", side="below", value=-0.35))
     assert not passed(scene, BeyondConfig(axis="y", side="above", value=-0.35))
@@ -197,7 +195,7 @@ def test_steps_are_yielded_as_they_happen(make: Make) -> None:
 def test_recorder_grows_and_keeps_optional_arrays() -> None:
     steps = 2 * FIRST_CAPACITY + 5
     recorder = Recorder(2, 1, 10 * steps)
-    scene = Scene.from_arrays((), (), np.zeros((1, 7)), np.zeros((1, 6)))
+    scene = Scene([Obstacle(Sphere(0.1), np.zeros(3))])
     recorder.start(State(0.0, np.zeros(2)), scene)
     for k in range(steps):
         decision = Decision(
